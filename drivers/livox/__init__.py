@@ -1,0 +1,1 @@
+"""Livox Mid-360 LiDAR with its IMU, spoken to over UDP without any SDK."""

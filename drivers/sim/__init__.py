@@ -1,0 +1,1 @@
+"""A simulated forest, and emulators that speak the real protocols of the sensors from it."""

@@ -1,0 +1,1 @@
+"""The `mapforest` program: one module a command."""

@@ -1,0 +1,1 @@
+"""The recorder's control socket: message types and client. All that the user interface knows of the recorder."""

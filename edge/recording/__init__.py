@@ -1,0 +1,1 @@
+"""Writing a session: queue, writer thread, splits, session folder, repair."""

@@ -1,0 +1,1 @@
+"""The recorder service: drivers, health, control socket, watchdog, live view."""

@@ -1,0 +1,1 @@
+"""Judging a recording from its message indexes."""
