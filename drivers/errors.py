@@ -1,11 +1,11 @@
 """Errors of the sensor drivers.
 
-    DriverError
-    ├── ProtocolError      bytes that break the sensor's protocol
-    ├── SensorRefused      the sensor answered, and said no
-    ├── SensorUnreachable  nobody answers, or the link went away
-    ├── SensorUnsupported  another model or firmware than this driver speaks
-    └── SimulationError    the simulated payload cannot be built or run as asked
+DriverError
+├── ProtocolError      bytes that break the sensor's protocol
+├── SensorRefused      the sensor answered, and said no
+├── SensorUnreachable  nobody answers, or the link went away
+├── SensorUnsupported  another model or firmware than this driver speaks
+└── SimulationError    the simulated payload cannot be built or run as asked
 """
 
 

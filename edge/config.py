@@ -85,7 +85,7 @@ class Validation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole file. `sensors` maps a name to a table whose `driver` key picks the driver; the rest is that driver's."""
+    """The whole file. In `sensors`, the key `driver` of each table picks the driver; the rest belongs to it."""
 
     mission: Mission = Mission()
     recording: Recording = Recording()

@@ -1,11 +1,11 @@
 """Errors of the appliance.
 
-    EdgeError
-    ├── ConfigError      the configuration file: which key, what was found, what is expected
-    ├── RecordingError   a session cannot be started, written or finished
-    ├── FormatError      a file is not the recording it should be
-    ├── ControlError     the recorder cannot be reached, or refused a request
-    └── UsageError       the command line asks for something that makes no sense
+EdgeError
+├── ConfigError      the configuration file: which key, what was found, what is expected
+├── RecordingError   a session cannot be started, written or finished
+├── FormatError      a file is not the recording it should be
+├── ControlError     the recorder cannot be reached, or refused a request
+└── UsageError       the command line asks for something that makes no sense
 """
 
 

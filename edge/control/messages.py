@@ -145,7 +145,7 @@ class Status(msgspec.Struct, frozen=True, tag="status"):
     recording: Recording | None = None
     verdict: Verdict | None = None
     problems: tuple[str, ...] = ()
-    """What is wrong with the recorder itself (disk nearly full, writer stalled, queue overflow), each with what to do."""
+    """What is wrong with the recorder itself (disk nearly full, writer stalled), each with what to do."""
     version: int = PROTOCOL_VERSION
 
 
