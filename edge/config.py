@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import msgspec
+
+from drivers import registry
+from edge import toml_table
+from edge.errors import ConfigError
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Percent = Annotated[float, msgspec.Meta(ge=0, le=90)]
+Count = Annotated[int, msgspec.Meta(gt=0)]
+Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]
 
 
 class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,17 +44,17 @@ class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How a session is written."""
 
     folder: str = "~/mapforest/recordings"
-    split_s: float = 60.0
-    split_mib: int = 1024
-    queue_mib: int = 256
+    split_s: Positive = 60.0
+    split_mib: Count = 1024
+    queue_mib: Count = 256
     """Holds 7 s of a stalled card at more than three times the nominal data rate."""
-    reserve_percent: float = 12.5
+    reserve_percent: Percent = 12.5
     """Share of the queue that only IMU, GNSS and events may use."""
-    compression: str = "none"
-    chunk_kib: int = 1024
-    flush_s: float = 1.0
-    min_free_mib: int = 2048
-    min_free_percent: float = 3.0
+    compression: Literal["none", "lz4", "zstd"] = "none"
+    chunk_kib: Annotated[int, msgspec.Meta(ge=16, le=1024)] = 1024
+    flush_s: Positive = 1.0
+    min_free_mib: Annotated[int, msgspec.Meta(ge=0)] = 2048
+    min_free_percent: Percent = 3.0
     require_mount: bool = False
     """Refuse to record when `folder` is not below a mount point of its own (the card is missing)."""
 
@@ -60,18 +71,18 @@ class Live(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     enabled: bool = False
     host: str = "127.0.0.1"
-    port: int = 8765
-    lidar_hz: float = 2.0
+    port: Port = 8765
+    lidar_hz: Positive = 2.0
     """Scans a second sent to viewers; the file always gets all of them."""
 
 
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What validation expects of one topic."""
 
-    rate_hz: float
-    tolerance: float = 0.1
+    rate_hz: NotNegative
+    tolerance: Share = 0.1
     required: bool = True
-    max_gap_s: float = 0.0
+    max_gap_s: NotNegative = 0.0
     """0: five nominal periods, at least half a second."""
 
 
@@ -79,9 +90,13 @@ class Validation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Expected topics by name, added to the defaults of the sensors that are configured."""
 
     topics: dict[str, Expectation] = {}
-    min_fix_share: float = 0.5
+    min_fix_share: Share = 0.5
     """Share of GNSS epochs with any fix below which a recording is WARN."""
-    max_clock_sigma_ms: float = 5.0
+    max_clock_sigma_ms: Positive = 5.0
+
+
+def _default_sensors() -> dict[str, dict[str, Any]]:
+    return {name: {"driver": name} for name in registry.DRIVERS}
 
 
 class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -95,11 +110,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     topics: Topics = Topics()
     calibration: str = ""
     """Path of the calibration file; empty: the nominal geometry of the payload."""
-    sensors: dict[str, dict[str, Any]] = {
-        "livox": {"driver": "livox"},
-        "reach": {"driver": "reach"},
-        "gopro": {"driver": "gopro"},
-    }
+    sensors: dict[str, dict[str, Any]] = msgspec.field(default_factory=_default_sensors)
 
 
 def load(path: Path | None) -> Config:
@@ -108,4 +119,37 @@ def load(path: Path | None) -> Config:
     ConfigError names the file, the key as written (`recording.split_s`), what was found, what is expected, and
     the nearest known key for an unknown one.
     """
-    raise NotImplementedError
+    if path is None:
+        return Config()
+    config = toml_table.convert(toml_table.read(path), Config, str(path))
+    for name in config.sensors:
+        sensor_settings(config, name, str(path))
+    return config
+
+
+def sensor_driver(config: Config, name: str, source: str = "configuration") -> str:
+    """The driver of a sensor: the key `driver` of its table, or the name of the table itself."""
+    key = f"sensors.{name}.driver"
+    driver = config.sensors[name].get("driver", name)
+    if not isinstance(driver, str):
+        raise ConfigError(f"{source}: {key}: found {driver!r}, expected a text in quotes")
+    if driver not in registry.DRIVERS:
+        raise ConfigError(f"{source}: {key}: unknown driver {driver!r}: {toml_table.nearest(driver, registry.DRIVERS)}")
+    return driver
+
+
+def sensor_settings(config: Config, name: str, source: str = "configuration") -> msgspec.Struct:
+    """The driver's own configuration of a sensor, checked. ConfigError as `load`."""
+    driver = sensor_driver(config, name, source)
+    settings = {key: value for key, value in config.sensors[name].items() if key != "driver"}
+    kind: type[msgspec.Struct] = registry.config_type(driver)
+    return toml_table.convert(settings, kind, source, f"sensors.{name}")
+
+
+def to_toml(config: Config) -> str:
+    """The configuration in effect, every default and driver table spelled out: what goes into each recording."""
+    tables = msgspec.to_builtins(config)
+    for name in config.sensors:
+        settings = msgspec.to_builtins(sensor_settings(config, name))
+        tables["sensors"][name] = {"driver": sensor_driver(config, name), **settings}
+    return toml_table.render(tables)
