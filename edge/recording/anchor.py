@@ -15,7 +15,7 @@ class Anchor:
 
     @classmethod
     def now(cls) -> Anchor:
-        """Anchor at this instant. The tightest of a few readings, so a preemption between the two clocks hardly counts."""
+        """Anchor at this instant. The tightest of a few readings, so a preemption between the clocks hardly counts."""
         readings = []
         for _ in range(5):
             before = time.monotonic_ns()

@@ -31,7 +31,7 @@ class SessionRecorder:
         raise NotImplementedError
 
     def start(self) -> None:
-        """Make the folder, open the first split, start to write. RecordingError when the disk refuses or is too full."""
+        """Make the folder, open the first split, start to write. RecordingError when the disk refuses or is full."""
         raise NotImplementedError
 
     def offer(self, message: Recordable) -> None:
@@ -43,7 +43,7 @@ class SessionRecorder:
         raise NotImplementedError
 
     def stop(self, reason: str) -> SessionResult:
-        """Write what is queued, finish the splits, write `metadata.yaml` and `session.json`. Idempotent, never raises."""
+        """Write what is queued, finish the splits and the files beside them. Idempotent, never raises."""
         raise NotImplementedError
 
 
