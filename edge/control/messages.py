@@ -1,8 +1,9 @@
 """Protocol of the control socket, version 1: one JSON object a line, in both directions, over a UNIX stream socket.
 
-A client sends a `Request` and gets one `Reply` with the same `id`. After `subscribe` the recorder also sends
-a `Status` line whenever it makes a new one (about four a second). `start` and `stop` are idempotent:
-asking for what already is answers `ok` with the session it is about.
+A client sends a `Request` and gets one `Reply` with the same `id`; the reply to `status` is followed by one
+`Status` line. After `subscribe` the recorder also sends a `Status` line whenever it makes a new one (about four a
+second). A line the recorder cannot read is answered with id 0, and the connection closed. `start` and `stop` are
+idempotent: asking for what already is answers `ok` with the session it is about. Every line says its version.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import msgspec
 PROTOCOL_VERSION = 1
 
 
-class Request(msgspec.Struct, frozen=True, tag="request", omit_defaults=True):
+class Request(msgspec.Struct, frozen=True, tag="request"):
     """What a client asks. Unused fields stay empty."""
 
     command: Literal["hello", "status", "subscribe", "start", "stop", "mark", "validate"]
@@ -30,7 +31,7 @@ class Request(msgspec.Struct, frozen=True, tag="request", omit_defaults=True):
     """mark: what happened here."""
 
 
-class Reply(msgspec.Struct, frozen=True, tag="reply", omit_defaults=True):
+class Reply(msgspec.Struct, frozen=True, tag="reply"):
     """The recorder's answer. `error` says what is wrong and what to do; empty when ok."""
 
     id: int
