@@ -1,0 +1,138 @@
+"""The `mapforest` program: a table of commands, each a module that is imported only when it is used."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol, cast
+
+from drivers.errors import DriverError
+from edge import __version__
+from edge.cli import exit_codes
+from edge.errors import EdgeError, UsageError
+
+COMMANDS: dict[str, str] = {
+    "demo": "edge.cli.demo",
+    "recorder": "edge.cli.recorder",
+    "tui": "edge.cli.tui",
+    "start": "edge.cli.start",
+    "stop": "edge.cli.stop",
+    "status": "edge.cli.status",
+    "mark": "edge.cli.mark",
+    "doctor": "edge.cli.doctor",
+    "validate": "edge.cli.validate",
+    "recover": "edge.cli.recover",
+    "info": "edge.cli.info",
+    "evaluate": "edge.cli.evaluate",
+    "sim": "edge.cli.sim",
+}
+"""command -> module with HELP, add_arguments and run. Import strings, so that `status` does not load numba."""
+
+
+class Command(Protocol):
+    """What a command's module offers."""
+
+    HELP: str
+    """One line, then an example."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the command's own options."""
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Do it; returns an exit code of `edge.cli.exit_codes`."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point. Exit codes: 0 good, 1 failed, 2 wrong usage, 3 done with warnings."""
+    args = sys.argv[1:] if argv is None else list(argv)
+    name = next((word for word in args if not word.startswith("-")), "")
+    command = _load(name) if name in COMMANDS else None
+    options = _parser(name, command).parse_args(args)
+    _set_up_logging(options.verbose)
+    if command is None:
+        return exit_codes.USAGE
+    return _run(command, options)
+
+
+def _load(name: str) -> Command:
+    return cast("Command", importlib.import_module(COMMANDS[name]))
+
+
+def _parser(chosen: str, command: Command | None) -> argparse.ArgumentParser:
+    """All names are listed; only the chosen command's module is loaded."""
+    parser = argparse.ArgumentParser(
+        prog="mapforest",
+        description="Map forests and find an invasive tree: record, watch, validate.",
+        epilog="exit codes: 0 good, 1 failed, 2 wrong usage, 3 done with warnings",
+    )
+    parser.add_argument("--version", action="version", version=f"mapforest {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    listed = COMMANDS if chosen not in COMMANDS else [chosen]
+    for name in listed:
+        text = (command if name == chosen and command else _load(name)).HELP
+        sub = commands.add_parser(
+            name,
+            help=text.splitlines()[0],
+            description=text,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        sub.add_argument("--config", type=Path, default=_default_config(), metavar="FILE", help="TOML configuration")
+        sub.add_argument("--json", action="store_true", help="print JSON for programs")
+        sub.add_argument("--verbose", "-v", action="store_true", help="say more on standard error")
+        if name == chosen and command is not None:
+            command.add_arguments(sub)
+    return parser
+
+
+def _default_config() -> Path | None:
+    """MAPFOREST_CONFIG, else the installed file, else the defaults."""
+    named = os.environ.get("MAPFOREST_CONFIG")
+    if named:
+        return Path(named)
+    installed = Path("/etc/mapforest/mapforest.toml")
+    return installed if installed.exists() else None
+
+
+def _set_up_logging(verbose: bool) -> None:
+    """To standard error; under systemd with the priority prefixes that journald reads."""
+    under_systemd = "JOURNAL_STREAM" in os.environ
+    handler = logging.StreamHandler()
+    handler.setFormatter(
+        _JournalFormatter() if under_systemd else logging.Formatter("%(levelname)s %(name)s: %(message)s")
+    )
+    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler], force=True)
+
+
+class _JournalFormatter(logging.Formatter):
+    """Prefixes the syslog priority: <3> error, <4> warning, <6> info, <7> debug."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        level = 3 if record.levelno >= logging.ERROR else 4 if record.levelno >= logging.WARNING else 6
+        level = 7 if record.levelno < logging.INFO else level
+        return f"<{level}>{record.name}: {super().format(record)}"
+
+
+def _run(command: Command, options: argparse.Namespace) -> int:
+    try:
+        return command.run(options)
+    except UsageError as error:
+        print(f"mapforest: {error}", file=sys.stderr)
+        return exit_codes.USAGE
+    except (EdgeError, DriverError) as error:
+        print(f"mapforest: {error}", file=sys.stderr)
+        return exit_codes.FAILED
+    except KeyboardInterrupt:
+        print("mapforest: interrupted", file=sys.stderr)
+        return exit_codes.FAILED
+    except BrokenPipeError:  # `mapforest info | head`: the reader left, nothing is wrong
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return exit_codes.GOOD
+
+
+if __name__ == "__main__":
+    sys.exit(main())
