@@ -29,6 +29,7 @@ CLIENT_LIMIT = 32
 BACKLOG_LIMIT = 256 * 1024
 """Bytes a client may leave unread: about 12 s of states, beyond what the kernel holds for it."""
 _SHUTDOWN_S = 2.0
+_HANG_UP_S = 0.5
 
 
 class Commands(Protocol):
@@ -54,6 +55,7 @@ class ControlServer:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="command")
         self._clients: set[asyncio.StreamWriter] = set()
         self._subscribers: set[asyncio.StreamWriter] = set()
+        self._stopping = asyncio.Event()
         self._inode = 0
 
     def start(self) -> None:
@@ -74,7 +76,8 @@ class ControlServer:
     def stop(self) -> None:
         """Hang up on everyone and remove the socket. Idempotent."""
         if self._loop is not None and self._thread is not None and self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._loop.stop)
+            with contextlib.suppress(RuntimeError):  # its loop has just ended
+                self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join(_SHUTDOWN_S)
         self._worker.shutdown(wait=False, cancel_futures=True)
         with contextlib.suppress(OSError):
@@ -83,21 +86,31 @@ class ControlServer:
 
     def _run(self, loop: asyncio.AbstractEventLoop, listening: socket.socket) -> None:
         asyncio.set_event_loop(loop)
-        server = loop.run_until_complete(asyncio.start_unix_server(self._serve, sock=listening, limit=REQUEST_LIMIT))
         try:
-            loop.run_forever()
+            loop.run_until_complete(self._serve_until_stopped(listening))
         finally:
-            server.close()
-            self._hang_up(loop)
             loop.close()
 
-    def _hang_up(self, loop: asyncio.AbstractEventLoop) -> None:
-        for writer in self._clients:
+    async def _serve_until_stopped(self, listening: socket.socket) -> None:
+        server = await asyncio.start_unix_server(self._serve, sock=listening, limit=REQUEST_LIMIT)
+        await self._stopping.wait()
+        asyncio.get_running_loop().remove_reader(listening.fileno())
+        await self._hang_up()
+        server.close()
+
+    async def _hang_up(self) -> None:
+        """End every connection. Those just being made first finish that: cut short, asyncio would leak them."""
+        for _ in range(3):
+            await asyncio.sleep(0)
+        for writer in tuple(self._clients):
             writer.transport.abort()
-        pending = asyncio.all_tasks(loop)
-        for task in pending:
-            task.cancel()
-        loop.run_until_complete(asyncio.gather(*pending, return_exceptions=True))
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        if others:
+            _, stuck = await asyncio.wait(others, timeout=_HANG_UP_S)
+            for task in stuck:
+                task.cancel()
+            await asyncio.gather(*stuck, return_exceptions=True)
+        await asyncio.sleep(0)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._clients) >= CLIENT_LIMIT:
@@ -140,9 +153,7 @@ class ControlServer:
     async def _reply(self, request: Request, receive_ns: int) -> Reply:
         if request.command in ("hello", "status", "subscribe"):
             return Reply(request.id, ok=True, software=self._software)
-        return await asyncio.get_running_loop().run_in_executor(
-            self._worker, self._commands.handle, request, receive_ns
-        )
+        return await asyncio.get_running_loop().run_in_executor(self._worker, self._carry_out, request, receive_ns)
 
     def _carry_out(self, request: Request, receive_ns: int) -> Reply:
         try:
