@@ -1,0 +1,66 @@
+"""Where the sensors sit on the payload: the nominal geometry, or the calibration file.
+
+The file has a table for each frame that differs from nominal:
+
+    [camera]
+    translation_m = [0.06, 0.0, -0.07]
+    rotation_xyzw = [-0.5, 0.5, -0.5, 0.5]
+
+Each is the pose of that frame in `base_link`, which is the IMU (x forward, y left, z up).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from edge import toml_table
+from edge.errors import ConfigError
+from edge.ros.frames import BASE_LINK, CAMERA, GNSS_ANTENNA, LIDAR, Transform
+
+
+class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Pose in `base_link`."""
+
+    translation_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+
+
+class Frames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Poses of all sensors in `base_link`; the defaults are the nominal payload.
+
+    Mid-360: the point origin is at (-0.011, -0.02329, 0.04412) m of the IMU by the maker's manual. Camera: optical
+    frame (x right, y down, z forward) ahead of and below the LiDAR. Antenna: on top.
+    """
+
+    livox_frame: Pose = Pose((-0.011, -0.02329, 0.04412))
+    camera: Pose = Pose((0.06, 0.0, -0.07), (-0.5, 0.5, -0.5, 0.5))
+    gnss_antenna: Pose = Pose((-0.05, 0.0, 0.20))
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The static transforms, and the text of the file they are from (empty: nominal)."""
+
+    transforms: tuple[Transform, ...]
+    text: str
+
+
+def load_calibration(path: str) -> Calibration:
+    """Read the calibration file; the nominal geometry when `path` is empty. ConfigError for a file that is wrong."""
+    if not path:
+        return Calibration(_transforms(Frames()), "")
+    file = Path(path).expanduser()
+    frames = toml_table.convert(toml_table.read(file), Frames, str(file))
+    for name, pose in msgspec.structs.asdict(frames).items():
+        norm = sum(value * value for value in pose.rotation_xyzw)
+        if abs(norm - 1) > 1e-3:
+            raise ConfigError(f"{file}: {name}.rotation_xyzw: length {norm**0.5:.4f}, a unit quaternion is expected")
+    return Calibration(_transforms(frames), file.read_text())
+
+
+def _transforms(frames: Frames) -> tuple[Transform, ...]:
+    poses = ((LIDAR, frames.livox_frame), (CAMERA, frames.camera), (GNSS_ANTENNA, frames.gnss_antenna))
+    return tuple(Transform(BASE_LINK, name, pose.translation_m, pose.rotation_xyzw) for name, pose in poses)
