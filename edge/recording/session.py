@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
 
-from edge.config import Config, to_toml
+import msgspec
+
+from edge import toml_table
+from edge.config import Config
 from edge.errors import RecordingError
 from edge.recording.account import RecordingStatus, Repair, SessionAbout, SessionResult, TopicDrops, Verdict
 from edge.recording.anchor import Anchor
@@ -65,7 +69,7 @@ class SessionRecorder:
         self._queue = RecordQueue(self._limits.queue_mib << 20, self._limits.reserve_percent)
         self._tally = Tally(anchor, about)
         self._calibration = load_calibration(config.calibration)
-        self._config_toml = about.config_toml or to_toml(config)
+        self._config_toml = about.config_toml or toml_table.render(msgspec.to_builtins(config))
         self._stopping = Lock()
         self._result: SessionResult | None = None
         self._ended_ns = 0
@@ -100,7 +104,7 @@ class SessionRecorder:
             folder=str(self._folder),
             elapsed_s=(self._clock() - self._anchor.monotonic_ns) / 1e9,
             bytes_written=splits.bytes_written,
-            messages=self._tally.messages,
+            messages=splits.messages,
             dropped=self._dropped(),
             queue_fill=self._queue.fill(),
             flush_ms=writer.flush_ms,
@@ -183,6 +187,13 @@ class SessionRecorder:
     def _dropped(self) -> dict[str, TopicDrops]:
         return drops_by_topic(self._queue.drops(), self._channels, self._anchor)
 
+    def _counts(self) -> dict[str, int]:
+        """Messages by topic in the finished files."""
+        counts: Counter[str] = Counter()
+        for split in tuple(self._splits.finished):
+            counts.update(split.counts)
+        return dict(counts)
+
     def _session_record(self, split: int) -> dict[str, str]:
         """The metadata record "session" at the head of each split."""
         return {
@@ -213,9 +224,9 @@ class SessionRecorder:
             reason=reason,
             error=error,
             duration_s=(self._clock() - self._anchor.monotonic_ns) / 1e9,
-            bytes_written=splits.bytes_written,
-            messages=tally.messages,
-            counts=dict(tally.counts),
+            bytes_written=sum(split.size_bytes for split in tuple(splits.finished)),
+            messages=sum(self._counts().values()),
+            counts=self._counts(),
             dropped=self._dropped(),
             splits=tuple(splits.finished),
             gnss_quality=dict(tally.gnss_quality),
@@ -234,9 +245,9 @@ class SessionRecorder:
             reason=writer.ended or writer.stop_reason,
             error=writer.error,
             duration_s=(self._ended_ns - self._anchor.monotonic_ns) / 1e9,
-            bytes_written=splits.bytes_written,
-            messages=self._tally.messages,
-            counts=dict(self._tally.counts),
+            bytes_written=sum(split.size_bytes for split in splits.finished),
+            messages=sum(self._counts().values()),
+            counts=self._counts(),
             dropped=self._dropped(),
             splits=tuple(split.file for split in splits.finished),
         )

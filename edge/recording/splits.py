@@ -13,6 +13,7 @@ from edge.recording.background import Background
 from edge.recording.bag import METADATA_YAML, SplitFacts, metadata_yaml, read_facts
 from edge.recording.disk import Disk
 from edge.recording.split import SplitFile, compression_type
+from edge.recording.summary import Written
 from edge.ros.topics import Channel
 
 _log = logging.getLogger(__name__)
@@ -45,7 +46,8 @@ class Splits:
         self._opening = opening
         self._static = static
         self._compression = compression_type(limits.compression)
-        self._sequences: dict[str, int] = {}
+        self.messages = 0
+        self._counts: dict[str, int] = {}
         self._closed_bytes = 0
         self._start_ns = 0
         self._current: SplitFile | None = None
@@ -78,9 +80,12 @@ class Splits:
         self._hand_over(old, summary)
 
     def write(self, topic: str, log_ns: int, publish_ns: int, data: bytes) -> None:
-        sequence = self._sequences.get(topic, 0)
-        self.current.write(topic, log_ns, publish_ns, sequence, data)
-        self._sequences[topic] = sequence + 1
+        """A message into the current split; its sequence number runs on from split to split."""
+        self._append(self.current, topic, log_ns, publish_ns, data)
+
+    def written(self) -> Written:
+        """What went into the current split and into the session so far. Called by the thread that writes."""
+        return Written(self._folder.name, dict(self.current.topics), dict(self._counts))
 
     def finish(self, summary: bytes) -> None:
         """Finish the last split and return when all are on the medium under their final names."""
@@ -113,10 +118,14 @@ class Splits:
     def _begin(self, split: SplitFile, now_ns: int) -> None:
         split.begin(self._opening(self.number), self._channels)
         channel, data = self._static(now_ns)
-        sequence = self._sequences.get(channel.topic, 0)
-        split.write(channel.topic, now_ns, now_ns, sequence, data)
+        self._append(split, channel.topic, now_ns, now_ns, data)
         split.flush()
-        self._sequences[channel.topic] = sequence + 1
+
+    def _append(self, split: SplitFile, topic: str, log_ns: int, publish_ns: int, data: bytes) -> None:
+        sequence = self._counts.get(topic, 0)
+        split.write(topic, log_ns, publish_ns, sequence, data)
+        self._counts[topic] = sequence + 1
+        self.messages += 1
 
     def _hand_over(self, split: SplitFile, summary: bytes) -> None:
         self._closed_bytes += split.size_bytes

@@ -73,14 +73,20 @@ class SplitSummary(msgspec.Struct, frozen=True, kw_only=True):
     flush_worst_ms: float
 
 
+class Written(msgspec.Struct, frozen=True):
+    """What is in the files: `topics` of the split that ends, `session_counts` by topic of the whole session."""
+
+    session: str
+    topics: dict[str, TopicSpan]
+    session_counts: dict[str, int]
+
+
 class Tally:
     """Counts what goes into the file. Used by the writer's thread; its numbers may be read from any."""
 
     def __init__(self, anchor: Anchor, about: SessionAbout) -> None:
         self._anchor = anchor
         self._about = about
-        self.messages = 0
-        self.counts: Counter[str] = Counter()
         self.gnss_quality: Counter[str] = Counter()
         self.events: Counter[str] = Counter()
         self.marks: list[MarkNote] = []
@@ -89,10 +95,8 @@ class Tally:
         self.clock_steps = 0
         self.flush_worst_ms = 0.0
 
-    def add(self, topic: str, message: Recordable) -> None:
-        """One message was written to `topic`."""
-        self.messages += 1
-        self.counts[topic] += 1
+    def add(self, message: Recordable) -> None:
+        """One message was written."""
         match message:
             case GnssFix():
                 self.gnss_quality[str(int(message.quality))] += 1
@@ -112,16 +116,14 @@ class Tally:
         drift_ms = self.clock_drift_ns / 1e6
         return ClockNote(about.clock_synchronised, about.clock_source, drift_ms, self.clock_steps)
 
-    def summary(
-        self, split: int, ended: str, topics: dict[str, TopicSpan], dropped: dict[str, TopicDrops], session: str
-    ) -> SplitSummary:
+    def summary(self, split: int, ended: str, written: Written, dropped: dict[str, TopicDrops]) -> SplitSummary:
         """The closing words of a split."""
         return SplitSummary(
-            session=session,
+            session=written.session,
             split=split,
             ended=ended,
-            topics=topics,
-            session_counts=dict(self.counts),
+            topics=written.topics,
+            session_counts=written.session_counts,
             dropped=dropped,
             diagnostics=dict(self.diagnostics),
             gnss_quality=dict(self.gnss_quality),

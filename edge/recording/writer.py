@@ -102,7 +102,7 @@ class SessionWriter:
         if self._splits.due(log_ns):
             self._splits.roll(log_ns, self._summary("split"))
         self._splits.write(channel.topic, log_ns, stamp_ns, data)
-        self._tally.add(channel.topic, message)
+        self._tally.add(message)
 
     def _flush(self, started_ns: int) -> None:
         self._record_drops()
@@ -148,10 +148,8 @@ class SessionWriter:
 
     def _summary(self, ended: str) -> bytes:
         dropped = drops_by_topic(self._queue.drops(), self._channels, self._anchor)
-        split = self._splits
-        return msgspec.json.encode(
-            self._tally.summary(split.number, ended, dict(split.current.topics), dropped, self._folder.name)
-        )
+        splits = self._splits
+        return msgspec.json.encode(self._tally.summary(splits.number, ended, splits.written(), dropped))
 
     def _fail(self, problem: str) -> None:
         """Keep what can be kept; the rest of the queue is counted as lost."""
