@@ -1,0 +1,131 @@
+"""The two ways to a Reach: a serial device, and TCP. Both hand over bytes as they come."""
+
+from __future__ import annotations
+
+import contextlib
+import glob
+import os
+import select
+import socket
+from typing import Protocol
+
+import serial
+from serial.tools import list_ports
+
+from drivers.errors import SensorUnreachable
+from drivers.reach.config import SerialEndpoint, TcpEndpoint
+
+USB_VENDOR, USB_PRODUCT = 0x3032, 0x0013
+STABLE_PATHS = ("/dev/mapforest/gnss", "/dev/serial/by-id/*[Ee]mlid*", "/dev/serial/by-id/*[Rr]each*")
+CONNECT_TIMEOUT_S = 5.0
+READ_BYTES = 4096
+
+
+class Link(Protocol):
+    """An open link. `address` is where it leads, for people."""
+
+    address: str
+
+    def read(self, timeout_s: float) -> bytes:
+        """What arrived, empty when nothing did in time. SensorUnreachable when the link is gone."""
+
+    def close(self) -> None:
+        """Idempotent."""
+
+
+def open_link(endpoint: SerialEndpoint | TcpEndpoint, baud: int) -> Link:
+    """An open link without old bytes in it. SensorUnreachable says why there is none, and what to do."""
+    if isinstance(endpoint, TcpEndpoint):
+        return TcpLink(endpoint)
+    return SerialLink(endpoint.path or find_device(), baud)
+
+
+def find_device() -> str:
+    """Path of the Reach on USB, a name that survives replugging first."""
+    for pattern in STABLE_PATHS:
+        for path in sorted(glob.glob(pattern)):
+            return path
+    for port in list_ports.comports():
+        if (port.vid, port.pid) == (USB_VENDOR, USB_PRODUCT):
+            return str(port.device)
+    raise SensorUnreachable(
+        "no Reach on any USB port: plug it in with a data cable, or set endpoint to its serial device or TCP address"
+    )
+
+
+class SerialLink:
+    """A serial device, held exclusively. Input of before the opening is thrown away."""
+
+    def __init__(self, path: str, baud: int) -> None:
+        self.address = path
+        try:
+            self._serial = serial.Serial(path, baud, timeout=0, exclusive=True)
+            self._serial.reset_input_buffer()
+        except (OSError, ValueError) as error:
+            raise SensorUnreachable(_why_not_opened(path, error)) from error
+        self._poll = _poll_for(self._serial.fileno())
+
+    def read(self, timeout_s: float) -> bytes:
+        if not self._poll.poll(timeout_s * 1000.0):
+            return b""
+        try:
+            data = os.read(self._serial.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise SensorUnreachable(f"{self.address} is gone ({error.strerror}): check cable and power") from error
+        if not data:
+            raise SensorUnreachable(f"{self.address} is gone: check cable and power")
+        return data
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):  # the device may be gone, and there is nothing left to save
+            self._serial.close()
+
+
+class TcpLink:
+    """A TCP connection to the receiver's position output."""
+
+    def __init__(self, endpoint: TcpEndpoint) -> None:
+        self.address = f"{endpoint.host}:{endpoint.port}"
+        try:
+            self._socket = socket.create_connection((endpoint.host, endpoint.port), CONNECT_TIMEOUT_S)
+        except OSError as error:
+            raise SensorUnreachable(
+                f"{self.address} does not answer ({error.strerror or error}): check the network, and that the position"
+                " output is a TCP server on that port"
+            ) from error
+        self._socket.setblocking(False)
+        self._poll = _poll_for(self._socket.fileno())
+
+    def read(self, timeout_s: float) -> bytes:
+        if not self._poll.poll(timeout_s * 1000.0):
+            return b""
+        try:
+            data = self._socket.recv(READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise SensorUnreachable(f"{self.address} broke off ({error.strerror})") from error
+        if not data:
+            raise SensorUnreachable(f"{self.address} closed the connection")
+        return data
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _poll_for(descriptor: int) -> select.poll:
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    return poll
+
+
+def _why_not_opened(path: str, error: OSError | ValueError) -> str:
+    if not os.path.exists(path):
+        return f"{path} does not exist: plug the Reach in, or correct the endpoint"
+    if not os.access(path, os.R_OK | os.W_OK):
+        return f"{path} may not be opened: add the user to the group dialout, or install the udev rules"
+    if "exclusively lock" in str(error):
+        return f"{path} is in use by another program: stop it (gpsd, ModemManager, another recorder)"
+    return f"{path} cannot be opened: {error}"
