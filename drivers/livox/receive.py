@@ -1,0 +1,206 @@
+"""The receiving thread: takes datagrams off the sockets into preallocated blocks, stamps them, and does nothing else.
+
+The kernel stamps each datagram on arrival (SO_TIMESTAMPNS), so the thread may sleep a few milliseconds and take
+bursts: it wakes 200 times a second instead of 2,283, and a busy interpreter does not blur the stamps. Each stamp is
+moved to CLOCK_MONOTONIC and kept between the last moment the socket was empty and now, so that a step of the
+host's clock cannot move it further than that.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from threading import Event
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.errors import SensorUnreachable
+
+SLOT_BYTES = 1408
+"""The longest data packet has 1380 bytes; longer datagrams are cut, and fail the length check."""
+BLOCK_SLOTS = 128
+BLOCKS = 48
+"""2.7 s of packets at the full rate wait here for the decoder, before the kernel's buffer fills as well."""
+PAUSE_S = 0.005
+POLL_S = 0.1
+BURST = 1024
+"""Datagrams taken off one socket before the others have their turn."""
+SO_TIMESTAMPNS = 35
+SO_RXQ_OVFL = 40
+_TIMESPEC = struct.Struct("@qq")
+_COUNT = struct.Struct("@I")
+_ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
+
+
+class Block:
+    """Datagrams as they came: bytes one a row, lengths, times of reception. Filled by one thread, read by another."""
+
+    def __init__(self) -> None:
+        self.slots: npt.NDArray[np.uint8] = np.zeros((BLOCK_SLOTS, SLOT_BYTES), np.uint8)
+        self.rows = [memoryview(row) for row in self.slots]
+        self.lengths: list[int] = []
+        self.receive_ns: list[int] = []
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    def clear(self) -> None:
+        """Forget the content, keep the memory."""
+        self.lengths.clear()
+        self.receive_ns.clear()
+
+
+@dataclass
+class Source:
+    """One bound socket, and what the kernel dropped on it because nobody took it in time."""
+
+    socket: socket.socket
+    buffer_bytes: int
+    empty_ns: int = field(default_factory=time.monotonic_ns)
+    kernel_drops: int = 0
+
+
+class Receiver:
+    """Receives from one LiDAR on any number of ports. `blocks()` hands over to the decoding thread."""
+
+    def __init__(self) -> None:
+        self._sources: list[Source] = []
+        self._free: deque[Block] = deque(Block() for _ in range(BLOCKS))
+        self._filled: deque[Block] = deque()
+        self._block = self._free.popleft()
+        self._arrived = Event()
+        self._address = ""
+        self.foreign = 0
+        """Datagrams from somebody else."""
+
+    def open(self, host: str, ports: tuple[int, ...], buffer_bytes: int) -> None:
+        """Bind, once. SensorUnreachable when this host does not have the address (yet), or a port is taken."""
+        if self._sources:
+            return
+        try:
+            self._sources = [_bind(host, port, buffer_bytes) for port in dict.fromkeys(ports)]
+        except OSError as error:
+            raise SensorUnreachable(
+                f"cannot receive on {host or 'any address'}, UDP ports {ports}: {error.strerror or error}; "
+                "check host_address and whether another program uses these ports"
+            ) from error
+
+    def accept_from(self, address: str) -> None:
+        """Take datagrams of this LiDAR only."""
+        self._address = address
+
+    @property
+    def buffer_bytes(self) -> int:
+        """What the kernel granted, the least of all sockets; 0 before they are open."""
+        return min((source.buffer_bytes for source in self._sources), default=0)
+
+    @property
+    def kernel_drops(self) -> int:
+        """Datagrams the kernel dropped because the buffer was full."""
+        return sum(source.kernel_drops for source in self._sources)
+
+    def run(self, stop: Event) -> None:
+        """Thread body. Sockets may be opened before or after it starts; it closes them at its end."""
+        try:
+            while not stop.is_set():
+                self._turn(stop)
+        finally:
+            for source in self._sources:
+                source.socket.close()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Whether datagrams came within the time."""
+        arrived = self._arrived.wait(timeout_s)
+        self._arrived.clear()
+        return arrived
+
+    def take(self) -> Block | None:
+        """The oldest filled block, None when there is none. Give it back when done."""
+        with contextlib.suppress(IndexError):
+            return self._filled.popleft()
+        return None
+
+    def give_back(self, block: Block) -> None:
+        """The block may be filled again."""
+        block.clear()
+        self._free.append(block)
+
+    def _turn(self, stop: Event) -> None:
+        sources = self._sources
+        if not sources:
+            stop.wait(POLL_S)
+            return
+        if len(self._block) < BLOCK_SLOTS:
+            poll = select.poll()
+            for source in sources:
+                poll.register(source.socket, select.POLLIN)
+            poll.poll(POLL_S * 1000)
+            for source in sources:
+                self._drain(source)
+        self._hand_over()
+        stop.wait(PAUSE_S)
+
+    def _drain(self, source: Source) -> None:
+        """Take everything that waits on a socket; when no block is free, the kernel keeps the rest."""
+        receive = source.socket.recvmsg_into
+        for _ in range(BURST):
+            if len(self._block) == BLOCK_SLOTS and not self._hand_over():
+                return
+            try:
+                length, ancillary, flags, sender = receive([self._block.rows[len(self._block)]], _ANCILLARY_BYTES)
+            except BlockingIOError:
+                source.empty_ns = time.monotonic_ns()
+                return
+            except OSError:  # an ICMP error of an earlier datagram; the socket lives on
+                continue
+            receive_ns = self._stamp(source, ancillary)
+            if sender[0] != self._address:
+                self.foreign += 1
+                continue
+            self._block.lengths.append(length if not flags & socket.MSG_TRUNC else 0)
+            self._block.receive_ns.append(receive_ns)
+
+    def _stamp(self, source: Source, ancillary: list[tuple[int, int, bytes]]) -> int:
+        """Arrival on CLOCK_MONOTONIC; notes the kernel's drops on the way."""
+        now_ns = time.monotonic_ns()
+        arrival_ns = now_ns
+        for _, kind, data in ancillary:
+            if kind == SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
+                seconds, nanoseconds = _TIMESPEC.unpack(data)
+                age_ns = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
+                arrival_ns = max(source.empty_ns, min(now_ns, now_ns - age_ns))
+            elif kind == SO_RXQ_OVFL:
+                source.kernel_drops = _COUNT.unpack(data)[0]
+        return arrival_ns
+
+    def _hand_over(self) -> bool:
+        """Pass the block on when it is full, or when the decoder has nothing to do. True when a fresh one is there."""
+        full = len(self._block) == BLOCK_SLOTS
+        if len(self._block) and (full or not self._filled) and self._free:
+            self._filled.append(self._block)
+            self._block = self._free.popleft()
+            self._arrived.set()
+            return True
+        return not full
+
+
+def _bind(host: str, port: int, buffer_bytes: int) -> Source:
+    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
+        for option in (SO_TIMESTAMPNS, SO_RXQ_OVFL):
+            with contextlib.suppress(OSError):  # without: stamped on the way out of the socket, drops not counted
+                bound.setsockopt(socket.SOL_SOCKET, option, 1)
+        bound.bind((host, port))
+        bound.setblocking(False)
+    except OSError:
+        bound.close()
+        raise
+    granted = bound.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux reports twice what it grants
+    return Source(bound, granted)
