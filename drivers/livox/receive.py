@@ -62,7 +62,8 @@ class Source:
 
     socket: socket.socket
     buffer_bytes: int
-    empty_ns: int = field(default_factory=time.monotonic_ns)
+    not_before_ns: int = field(default_factory=time.monotonic_ns)
+    """What comes next did not arrive before this: the socket was empty, or an earlier datagram came."""
     kernel_drops: int = 0
 
 
@@ -149,35 +150,23 @@ class Receiver:
     def _drain(self, source: Source) -> None:
         """Take everything that waits on a socket; when no block is free, the kernel keeps the rest."""
         receive = source.socket.recvmsg_into
+        offset_ns = _realtime_offset_ns()
         for _ in range(BURST):
             if len(self._block) == BLOCK_SLOTS and not self._hand_over():
                 return
             try:
                 length, ancillary, flags, sender = receive([self._block.rows[len(self._block)]], _ANCILLARY_BYTES)
             except BlockingIOError:
-                source.empty_ns = time.monotonic_ns()
+                source.not_before_ns = time.monotonic_ns()
                 return
             except OSError:  # an ICMP error of an earlier datagram; the socket lives on
                 continue
-            receive_ns = self._stamp(source, ancillary)
+            receive_ns = _arrival_ns(source, ancillary, offset_ns)
             if sender[0] != self._address:
                 self.foreign += 1
                 continue
             self._block.lengths.append(length if not flags & socket.MSG_TRUNC else 0)
             self._block.receive_ns.append(receive_ns)
-
-    def _stamp(self, source: Source, ancillary: list[tuple[int, int, bytes]]) -> int:
-        """Arrival on CLOCK_MONOTONIC; notes the kernel's drops on the way."""
-        now_ns = time.monotonic_ns()
-        arrival_ns = now_ns
-        for _, kind, data in ancillary:
-            if kind == SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
-                seconds, nanoseconds = _TIMESPEC.unpack(data)
-                age_ns = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
-                arrival_ns = max(source.empty_ns, min(now_ns, now_ns - age_ns))
-            elif kind == SO_RXQ_OVFL:
-                source.kernel_drops = _COUNT.unpack(data)[0]
-        return arrival_ns
 
     def _hand_over(self) -> bool:
         """Pass the block on when it is full, or when the decoder has nothing to do. True when a fresh one is there."""
@@ -188,6 +177,27 @@ class Receiver:
             self._arrived.set()
             return True
         return not full
+
+
+def _realtime_offset_ns() -> int:
+    """CLOCK_MONOTONIC minus CLOCK_REALTIME now, from the tightest of three readings."""
+    readings = [(time.monotonic_ns(), time.time_ns(), time.monotonic_ns()) for _ in range(3)]
+    before_ns, real_ns, after_ns = min(readings, key=lambda reading: reading[2] - reading[0])
+    return (before_ns + after_ns) // 2 - real_ns
+
+
+def _arrival_ns(source: Source, ancillary: list[tuple[int, int, bytes]], offset_ns: int) -> int:
+    """Arrival on CLOCK_MONOTONIC, never earlier than the datagram before; notes the kernel's drops on the way."""
+    now_ns = time.monotonic_ns()
+    arrival_ns = now_ns
+    for _, kind, data in ancillary:
+        if kind == SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
+            seconds, nanoseconds = _TIMESPEC.unpack(data)
+            arrival_ns = min(now_ns, seconds * 1_000_000_000 + nanoseconds + offset_ns)
+        elif kind == SO_RXQ_OVFL:
+            source.kernel_drops = _COUNT.unpack(data)[0]
+    source.not_before_ns = max(source.not_before_ns, arrival_ns)
+    return source.not_before_ns
 
 
 def _bind(host: str, port: int, buffer_bytes: int) -> Source:

@@ -1,0 +1,93 @@
+"""The driver against the emulated LiDAR, end to end over UDP on loopback."""
+
+import numpy as np
+import pytest
+
+from drivers.driver import SensorState
+from drivers.livox.status import WorkState
+from drivers.sim.livox_emulator import BROADCAST
+from tests.drivers.livox.rig import driving, emulated, quick, running, streaming
+from tests.waiting import wait_for
+
+
+def test_streams_scans_and_inertial_samples():
+    with running() as rig:
+        streaming(rig, 6)
+        health = rig.health()
+        device = rig.emulator.device
+    assert health.state is SensorState.OK, health
+    assert health.temperature_c == pytest.approx(59.8)
+    assert health.details["serial number"] == device.options.serial
+    assert [stream.lost for stream in health.streams] == [0, 0]
+    stamps = np.array([scan.stamp_ns for scan in rig.scans[:-1]])
+    assert np.abs(np.diff(stamps) - 100_000_000).max() < 100_000
+    for scan in rig.scans[1:-1]:
+        assert len(scan.xyz_m) in (13_333, 13_334)  # 20,000 slots, a third without return
+        assert (np.diff(scan.offset_ns.astype(np.int64)) > 0).all()
+        assert scan.offset_ns.max() < 100_000_000
+        assert (scan.offset_ns % 5000 == scan.offset_ns[0] % 5000).all()
+        assert set(scan.line.tolist()) == {0, 1, 2, 3}
+        assert set(scan.tag.tolist()) == {16}
+    assert rig.samples[0].linear_acceleration == (0.0, 0.0, pytest.approx(9.80665))
+    assert rig.samples[0].angular_velocity[:2] == (0.25, 0.5)
+
+
+def test_points_and_inertial_samples_keep_their_relative_time():
+    """Both tell their walk time: the points by their x (slots of 5 us), the samples by their yaw rate (s)."""
+    with running() as rig:
+        streaming(rig, 5)
+    scan = rig.scans[2]
+    sample = min(rig.samples, key=lambda sample: abs(sample.stamp_ns - scan.stamp_ns - 50_000_000))
+    nearest = np.abs(scan.stamp_ns + scan.offset_ns.astype(np.int64) - sample.stamp_ns).argmin()
+    by_stamps = scan.stamp_ns + int(scan.offset_ns[nearest]) - sample.stamp_ns
+    point_s = (round(float(scan.xyz_m[nearest, 0]) * 1000) - 1) * 5e-6
+    by_walk = (point_s - sample.angular_velocity[2] + 0.05) % 0.1 - 0.05
+    assert by_stamps / 1e9 == pytest.approx(by_walk, abs=20e-6)
+
+
+def test_finds_the_lidar_by_discovery_and_by_its_push():
+    for uptime_s in (4100.0, 0.0):
+        with emulated(uptime_s=uptime_s) as (emulator, _, host):
+            settings = {"address": "", "serial_number": emulator.device.options.serial}
+            with driving(emulator, quick("", host, settings)) as rig:
+                streaming(rig, 2)
+
+
+def test_polite_stop_leaves_the_lidar_idle():
+    with emulated() as (emulator, lidar, host):
+        with driving(emulator, quick(lidar, host)) as rig:
+            streaming(rig, 2)
+        wait_for(lambda: emulator.device.machine.state is WorkState.IDLE, 3.0)
+
+
+def test_losses_are_exactly_those_injected():
+    with running("livox:loss=0.05@0.5+1.0", "livox:duplicate=0.05@0.5+1.0", "livox:reorder=0.05@0.5+1.0") as rig:
+        wait_for(lambda: rig.scans, 10.0)
+        first_ns = rig.scans[0].stamp_ns
+        wait_for(lambda: rig.scans[-1].stamp_ns - first_ns > 1.6e9, 10.0)
+        streaming(rig, 2)
+        streams = rig.health().streams
+        details = rig.health().details
+        points, imu = rig.emulator.points.tally, rig.emulator.imu.tally
+    assert points.lost > 20
+    assert (streams[0].lost, streams[1].lost) == (points.lost, imu.lost)
+    assert int(details["duplicate packets"]) == points.duplicated + imu.duplicated
+    assert int(details["late packets"]) > 0
+
+
+@pytest.mark.parametrize(
+    ("device", "said"), [({"firmware_type": 0}, "loader"), ({"device_type": 35, "firmware_type": 1}, "Mid-360S")]
+)
+def test_refuses_what_it_does_not_speak_to(device, said):
+    with running(**device) as rig:
+        wait_for(lambda: rig.health().state is SensorState.FAILED, 5.0)
+        assert said in rig.health().problem
+
+
+def test_nobody_there():
+    with emulated() as (emulator, _, host):
+        settings = {"address": "127.66.66.66", "discovery_address": BROADCAST}
+        with driving(emulator, quick("", host, settings)) as rig:
+            wait_for(lambda: "does not answer" in rig.health().problem, 5.0)
+            assert rig.health().state is SensorState.SEARCHING
+            assert "check its power" in rig.health().advice
