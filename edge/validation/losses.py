@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 
 from edge.validation.report import Finding, Level
 from edge.validation.told import Told
 
-_LOST = re.compile(r"(?:^|[ _./])(lost|dropped)(?:$|[ _./])", re.IGNORECASE)
-_FAIL_SHARE, _WARN_SHARE = 0.05, 0.005
+_SENSOR = "sensor/"
+_LOST, _RECEIVED = ".lost", ".received"
+_WARN_SHARE, _FAIL_SHARE = 0.005, 0.1
+"""Losses on the way from a sensor: odometry bears a few packets, not every tenth."""
+_DROP_FAIL_SHARE = 0.05
 
 
 def dropped(said: Told | None) -> dict[str, int]:
@@ -17,14 +19,18 @@ def dropped(said: Told | None) -> dict[str, int]:
     return {topic: drops.count for topic, drops in (said.dropped if said else {}).items() if drops.count}
 
 
-def lost(said: Told | None) -> dict[str, int]:
-    """By "sensor: stream", from the last diagnostics: every value whose name says "lost"."""
-    found: dict[str, int] = {}
+def lost(said: Told | None) -> dict[str, tuple[int, int]]:
+    """(lost, received) by "sensor stream" from the last diagnostics, since the driver started; where any were lost."""
+    found: dict[str, tuple[int, int]] = {}
     for part, note in (said.diagnostics if said else {}).items():
         for key, value in note.values.items():
-            count = re.match(r"\s*(\d+)", value)
-            if count and int(count[1]) and _LOST.search(key):
-                found[f"{part}: {key}"] = int(count[1])
+            if not part.startswith(_SENSOR) or not key.endswith(_LOST) or not value.isdecimal():
+                continue
+            stream = key.removesuffix(_LOST)
+            received = note.values.get(stream + _RECEIVED, "")
+            if int(value):
+                name = f"{part.removeprefix(_SENSOR)} {stream}"
+                found[name] = (int(value), int(received) if received.isdecimal() else 0)
     return found
 
 
@@ -32,22 +38,15 @@ def check_dropped(drops: Mapping[str, int], counts: Mapping[str, int]) -> Iterat
     """A drop means that the card was too slow."""
     for topic, count in drops.items():
         share = count / (count + counts.get(topic, 0))
+        level = Level.FAIL if share > _DROP_FAIL_SHARE else Level.WARN
         text = f"The recorder had to leave out {count:,} messages of {topic} ({share:.1%})."
-        yield Finding(_level(share), topic, text, "The card was too slow; use a faster one, or format this one.")
+        yield Finding(level, topic, text, "The card was too slow; use a faster one, or format this one.")
 
 
-def check_lost(said: Told | None) -> Iterator[Finding]:
-    """What got lost between a sensor and the computer, against what arrived where that was told."""
-    for name, count in lost(said).items():
-        part, key = name.split(": ", 1)
-        values = said.diagnostics[part].values if said else {}
-        received = re.match(r"\s*(\d+)", values.get(_LOST.sub(lambda m: m[0].replace(m[1], "received"), key), ""))
-        share = count / (count + int(received[1])) if received else 0.0
-        told = f" ({share:.1%})" if received else ""
-        level = _level(share) if not received or share > _WARN_SHARE else Level.NOTE
-        text = f"Between {part} and the recorder {count:,} were lost{told}: {key}."
+def check_lost(losses: Mapping[str, tuple[int, int]]) -> Iterator[Finding]:
+    """What got lost between a sensor and the computer, as its driver counted it."""
+    for name, (count, received) in losses.items():
+        share = count / (count + received)
+        level = Level.FAIL if share > _FAIL_SHARE else Level.WARN if share > _WARN_SHARE else Level.NOTE
+        text = f"Between the sensor and the computer {share:.1%} were lost ({name}: {count:,})."
         yield Finding(level, "", text, "Check the cable, or the distance of the radio link.")
-
-
-def _level(share: float) -> Level:
-    return Level.FAIL if share > _FAIL_SHARE else Level.WARN

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from edge.config import Config
-from edge.validation import clocks, expected, gnss, losses
+from edge.validation import clocks, expected, gnss, losses, structure
 from edge.validation.checks import CHECKS, Facts
 from edge.validation.expected import Expected
 from edge.validation.index import FileIndex
@@ -55,7 +55,6 @@ class Evidence:
     wanted: dict[str, Expected]
     fix_topic: str
     gnss: GnssShare | None
-    sigmas_ms: dict[str, float]
 
 
 def gather(recording: Recording, config: Config) -> Evidence:
@@ -66,7 +65,7 @@ def gather(recording: Recording, config: Config) -> Evidence:
     fix_topic = _fix_topic(recording, config)
     share = gnss.share_of(recording.files, fix_topic, recording.said) if fix_topic else None
     wanted = _wanted(recording, config, rates, sample)
-    return Evidence(recording, config, sample, rates, wanted, fix_topic, share, clocks.sigmas_ms(recording.said))
+    return Evidence(recording, config, sample, rates, wanted, fix_topic, share)
 
 
 def _wanted(recording: Recording, config: Config, rates: dict[str, Rates], sample: Sample) -> dict[str, Expected]:
@@ -96,7 +95,7 @@ def _ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 def _findings(evidence: Evidence) -> Iterator[Finding]:
     recording, said = evidence.recording, evidence.recording.said
-    yield from _file_findings(recording, evidence.sample)
+    yield from structure.check(recording, evidence.sample)
     if not recording.times:
         yield Finding(Level.FAIL, "", "The recording holds no messages.", _EMPTY_ADVICE)
         return
@@ -106,9 +105,9 @@ def _findings(evidence: Evidence) -> Iterator[Finding]:
             yield from check(facts)
     counts = {name: one.count for name, one in evidence.rates.items()}
     yield from losses.check_dropped(losses.dropped(said), counts)
-    yield from losses.check_lost(said)
+    yield from losses.check_lost(losses.lost(said))
     limits = evidence.config.validation
-    yield from clocks.check(said, evidence.sigmas_ms, limits.max_clock_sigma_ms)
+    yield from clocks.check(said, limits.max_clock_sigma_ms)
     yield from gnss.check(evidence.gnss, limits.min_fix_share, evidence.fix_topic)
 
 
@@ -123,26 +122,6 @@ def _facts(evidence: Evidence, name: str) -> Facts:
         stamps_ns=tuple(sample.stamps(name)),
         latencies_s=sample.latencies_s(name),
     )
-
-
-def _file_findings(recording: Recording, sample: Sample) -> Iterator[Finding]:
-    advice = f"Run `mapforest recover {recording.name}`; it writes a sound copy and says what was lost."
-    for name, why in recording.unreadable.items():
-        yield Finding(Level.FAIL, "", f"{name} cannot be read: {why}.")
-    for index in recording.files:
-        if not index.finished:
-            text = f"{index.path.name} was not closed: it is still being recorded, or the power was cut."
-            yield Finding(Level.WARN, "", text, advice)
-        for damage in index.damages:
-            level = Level.WARN if "cut off" in damage else Level.FAIL
-            yield Finding(level, "", f"{index.path.name} is damaged: {damage}.", advice)
-    for damage in sample.damages:
-        yield Finding(Level.FAIL, "", f"The recording is damaged: {damage}.", advice)
-    for number in recording.missing_splits:
-        text = f"Part {number} of the recording is missing."
-        yield Finding(Level.FAIL, "", text, "Copy the whole session folder from the card again.")
-    for name in recording.conflicts:
-        yield Finding(Level.FAIL, name, f"{name} has different types in different files.")
 
 
 def _report(evidence: Evidence, findings: tuple[Finding, ...]) -> Report:
@@ -162,9 +141,9 @@ def _report(evidence: Evidence, findings: tuple[Finding, ...]) -> Report:
         size_bytes=sum(index.size for index in recording.files),
         messages=sum(one.count for one in rates.values()),
         gnss=evidence.gnss,
-        clock_sigma_ms=evidence.sigmas_ms,
+        clock_sigma_ms=clocks.sigmas_ms(recording.said),
         dropped=losses.dropped(recording.said),
-        lost=losses.lost(recording.said),
+        lost={name: count for name, (count, _) in losses.lost(recording.said).items()},
         elapsed_s=0.0,
     )
 

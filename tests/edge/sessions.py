@@ -73,7 +73,7 @@ def write_session(
     tf: bool = True,
     payload: int = 200,
 ) -> Path:
-    """A file of ours. session None: without the begin record, as others record."""
+    """A file of ours. session None: without begin and end record, as others record. summary {}: without end record."""
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=1 << 16, compression=CODECS[codec])
         writer.start("ros2", "test")
@@ -97,8 +97,8 @@ def write_session(
             status = statuses[number * len(statuses) // max(1, int(seconds * one.rate_hz)) % len(statuses)]
             data = fix(stamp, status) if topic == "/gnss/fix" else stamped(stamp, "frame", bytes(payload))
             writer.add_message(channels[topic], at, data, stamp, number)
-        if summary is not None:
-            writer.add_metadata("mapforest", {"summary": json.dumps(summary)})
+        if session is not None and finish and summary != {}:
+            writer.add_metadata("mapforest", {"summary": json.dumps(summary or {"ended": "stopped"})})
         if finish:
             writer.finish()
     return path

@@ -101,8 +101,9 @@ def test_the_word_of_the_recorder_counts(tmp_path):
     summary = {
         "dropped": {"/camera/video": {"count": 12, "first_ns": 1, "last_ns": 2}},
         "diagnostics": {
-            "livox": {"level": 0, "message": "ok", "values": {"points lost": "300", "points received": "9700"}},
-            "gopro": {"level": 0, "message": "", "values": {"clock sigma ms": "8.5"}},
+            "sensor/livox": {"level": 0, "message": "ok", "values": {"points.lost": "300", "points.received": "9700"}},
+            "sensor/gopro": {"level": 0, "message": "", "values": {"clock.sigma_ns": "8500000"}},
+            "recorder": {"level": 1, "message": "", "values": {"dropped": "12"}},
         },
         "gnss_quality": {"0": 70, "4": 30},
         "clock": {"synchronised_at_start": False, "source": "", "drift_ms": 0.0, "steps": 0},
@@ -111,9 +112,11 @@ def test_the_word_of_the_recorder_counts(tmp_path):
     report = judged(tmp_path, summary=summary)
     said = " ".join(report.reasons)
     assert "leave out 12 messages of /camera/video" in said
-    assert "300 were lost (3.0%)" in said
+    assert "3.0% were lost (livox points: 300)" in said
     assert "clock of gopro is known only to 8.5 ms" in said
     assert "position only 30% of the time (the recorder's count)" in said
+    assert report.lost == {"livox points": 300}
+    assert report.clock_sigma_ms == {"gopro": 8.5}
     assert report.gnss.qualities == {"no fix": 70, "RTK fixed": 30}
     assert any("clock was not set" in f.text and f.level == Level.NOTE for f in report.findings)
     assert report.verdict == "WARN"
@@ -151,6 +154,15 @@ def test_an_open_file_is_judged_and_said_to_be_open(tmp_path):
     path.write_bytes(path.read_bytes()[:-1000])
     torn = validate(path)
     assert any("cut off" in reason for reason in torn.reasons)
+
+
+def test_how_it_ended_is_said(tmp_path):
+    cut = judged(tmp_path, summary={})
+    assert cut.verdict == "WARN"
+    assert "cut off (power?)" in cut.reasons[0]
+    full = judged(tmp_path, summary={"ended": "disk reserve reached"})
+    assert full.verdict == "WARN"
+    assert "by itself: disk reserve reached" in full.reasons[0]
 
 
 def test_a_damaged_chunk_fails(tmp_path):
