@@ -130,6 +130,11 @@ class FaultyDisk(Disk):
     def before_sync(self, path: Path) -> None:
         self.on_sync(path)
 
+    def remove(self, path: Path) -> None:
+        if path.exists():
+            self.quota_bytes += path.stat().st_size
+        super().remove(path)
+
     def sync_folder(self, folder: Path) -> None:
         pass
 
