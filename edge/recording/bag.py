@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -49,6 +50,14 @@ def read_facts(path: Path) -> tuple[SplitFacts, list[Channel]]:
     counts = {one.topic: statistics.channel_message_counts.get(one.id, 0) for one in summary.channels.values()}
     start_ns, end_ns = statistics.message_start_time, statistics.message_end_time
     return SplitFacts(path.name, start_ns, end_ns, path.stat().st_size, counts), channels
+
+
+def counts_by_topic(splits: Iterable[SplitFacts]) -> dict[str, int]:
+    """Messages by topic in all of them."""
+    counts: Counter[str] = Counter()
+    for split in tuple(splits):
+        counts.update(split.counts)
+    return dict(counts)
 
 
 def metadata_yaml(splits: Sequence[SplitFacts], channels: Iterable[Channel]) -> bytes:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from pathlib import Path
 
 import msgspec
 
 from edge.errors import EdgeError
 from edge.recording.account import Repair
-from edge.recording.bag import METADATA_YAML, SplitFacts, metadata_yaml, read_facts
+from edge.recording.bag import METADATA_YAML, SplitFacts, counts_by_topic, metadata_yaml, read_facts
 from edge.recording.disk import Disk
 from edge.recording.folder import SESSION_JSON, read_session, write_session
 from edge.recording.split import ACTIVE_SUFFIX
@@ -78,9 +77,7 @@ def _settle(folder: Path) -> None:
     except EdgeError as error:
         _log.warning("%s", error)
         return
-    counts: Counter[str] = Counter()
-    for split in splits:
-        counts.update(split.counts)
+    counts = counts_by_topic(splits)
     filled = [split for split in splits if split.messages]
     span_ns = max((one.end_ns for one in filled), default=0) - min((one.start_ns for one in filled), default=0)
     write_session(
@@ -93,7 +90,7 @@ def _settle(folder: Path) -> None:
             duration_s=span_ns / 1e9,
             bytes_written=sum(split.size_bytes for split in splits),
             messages=sum(counts.values()),
-            counts=dict(counts),
+            counts=counts,
             splits=tuple(splits),
         ),
     )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
@@ -17,6 +17,7 @@ from edge.config import Config
 from edge.errors import RecordingError
 from edge.recording.account import RecordingStatus, Repair, SessionAbout, SessionResult, TopicDrops, Verdict
 from edge.recording.anchor import Anchor
+from edge.recording.bag import counts_by_topic
 from edge.recording.calibration import load_calibration
 from edge.recording.disk import Disk, floor_bytes
 from edge.recording.folder import SessionRecord, session_folder, set_verdict, utc_text, write_session
@@ -73,6 +74,7 @@ class SessionRecorder:
         self._stopping = Lock()
         self._result: SessionResult | None = None
         self._ended_ns = 0
+        self._splits: Splits | None = None
         self._writer: SessionWriter | None = None
         self._thread: Thread | None = None
 
@@ -85,6 +87,7 @@ class SessionRecorder:
         except FileExistsError as error:
             raise RecordingError(f"{self._folder}: exists already; every session needs a folder of its own") from error
         except OSError as error:
+            self._undo()
             raise RecordingError(disk_problem(self._folder, error)) from error
         self._thread = Thread(target=self._run, name="recorder-writer", daemon=True)
         self._thread.start()
@@ -146,7 +149,7 @@ class SessionRecorder:
 
     def _open(self) -> None:
         static = tf_static_channel(self._config.topics)
-        self._splits = Splits(
+        splits = self._splits = Splits(
             self._disk,
             self._folder,
             self._limits,
@@ -154,11 +157,11 @@ class SessionRecorder:
             opening=self._session_record,
             static=lambda stamp_ns: (static, encode_transforms(self._calibration.transforms, stamp_ns)),
         )
-        self._splits.open(self._anchor.session_ns(self._clock()))
-        self._splits.background.submit(partial(write_session, self._disk, self._folder, self._record("recording")))
+        splits.open(self._anchor.session_ns(self._clock()))
+        splits.background.submit(partial(write_session, self._disk, self._folder, self._record(splits, "recording")))
         self._writer = SessionWriter(
             self._queue,
-            self._splits,
+            splits,
             self._tally,
             channels=self._channels,
             anchor=self._anchor,
@@ -168,31 +171,31 @@ class SessionRecorder:
             clock=self._clock,
         )
 
+    def _undo(self) -> None:
+        """A start that failed leaves no thread and no empty folder behind."""
+        if self._splits is not None:
+            self._splits.abandon()
+        with suppress(OSError):
+            self._folder.rmdir()
+
     def _run(self) -> None:
         """Thread root."""
-        writer, _ = self._parts()
+        writer, splits = self._parts()
         writer.run()
         self._ended_ns = self._clock()
         try:
-            record = self._record("finished", writer.ended or writer.stop_reason, writer.error)
+            record = self._record(splits, "finished", writer.ended or writer.stop_reason, writer.error)
             write_session(self._disk, self._folder, record)
         except OSError as error:
             writer.error = writer.error or disk_problem(self._folder, error)
 
     def _parts(self) -> tuple[SessionWriter, Splits]:
-        if self._writer is None:
+        if self._writer is None or self._splits is None:
             raise RecordingError(f"session {self._folder.name} was not started")
         return self._writer, self._splits
 
     def _dropped(self) -> dict[str, TopicDrops]:
         return drops_by_topic(self._queue.drops(), self._channels, self._anchor)
-
-    def _counts(self) -> dict[str, int]:
-        """Messages by topic in the finished files."""
-        counts: Counter[str] = Counter()
-        for split in tuple(self._splits.finished):
-            counts.update(split.counts)
-        return dict(counts)
 
     def _session_record(self, split: int) -> dict[str, str]:
         """The metadata record "session" at the head of each split."""
@@ -212,8 +215,8 @@ class SessionRecorder:
             "calibration_toml": self._calibration.text,
         }
 
-    def _record(self, state: str, reason: str = "", error: str = "") -> SessionRecord:
-        tally, splits = self._tally, self._splits
+    def _record(self, splits: Splits, state: str, reason: str = "", error: str = "") -> SessionRecord:
+        tally, counts = self._tally, counts_by_topic(splits.finished)
         return SessionRecord(
             session=self._folder.name,
             state=state,
@@ -225,8 +228,8 @@ class SessionRecorder:
             error=error,
             duration_s=(self._clock() - self._anchor.monotonic_ns) / 1e9,
             bytes_written=sum(split.size_bytes for split in tuple(splits.finished)),
-            messages=sum(self._counts().values()),
-            counts=self._counts(),
+            messages=sum(counts.values()),
+            counts=counts,
             dropped=self._dropped(),
             splits=tuple(splits.finished),
             gnss_quality=dict(tally.gnss_quality),
@@ -239,6 +242,7 @@ class SessionRecorder:
         )
 
     def _account(self, writer: SessionWriter, splits: Splits) -> SessionResult:
+        counts = counts_by_topic(splits.finished)
         return SessionResult(
             session=self._folder.name,
             folder=self._folder,
@@ -246,8 +250,8 @@ class SessionRecorder:
             error=writer.error,
             duration_s=(self._ended_ns - self._anchor.monotonic_ns) / 1e9,
             bytes_written=sum(split.size_bytes for split in splits.finished),
-            messages=sum(self._counts().values()),
-            counts=self._counts(),
+            messages=sum(counts.values()),
+            counts=counts,
             dropped=self._dropped(),
             splits=tuple(split.file for split in splits.finished),
         )

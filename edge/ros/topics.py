@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import msgspec
+
 from drivers.messages import GnssFix, ImuSample, LidarScan, NmeaSentence, SensorEvent, VideoFrame
 from edge.config import Topics
+from edge.errors import ConfigError
 from edge.recording.messages import Diagnostics, Mark
 from edge.ros import schemas
 
@@ -38,7 +41,8 @@ class Channel:
 
 
 def channels(topics: Topics) -> Mapping[type, Channel]:
-    """The channel of each kind of message."""
+    """The channel of each kind of message. ConfigError when two kinds of different type share a topic."""
+    _refuse_shared(topics)
     events = Channel(topics.events, schemas.LOG)
     return {
         LidarScan: Channel(topics.lidar, schemas.POINT_CLOUD),
@@ -50,6 +54,14 @@ def channels(topics: Topics) -> Mapping[type, Channel]:
         SensorEvent: events,
         Mark: events,
     }
+
+
+def _refuse_shared(topics: Topics) -> None:
+    names = list(msgspec.structs.asdict(topics).items())
+    for number, (key, topic) in enumerate(names):
+        for other, same in names[:number]:
+            if topic == same:
+                raise ConfigError(f"topics.{key}: {topic!r} is also topics.{other}; each needs a name of its own")
 
 
 def tf_static_channel(topics: Topics) -> Channel:
