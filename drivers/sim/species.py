@@ -53,11 +53,11 @@ class Traits:
 
 
 TRAITS: tuple[Traits, ...] = (
-    Traits("oak", "Quercus rubra", Leaf.BROAD, 0.28, 0.45, 24.0, 4.5, 0.45, 11.0, 1.1, 0.0),
-    Traits("maple", "Acer rubrum", Leaf.BROAD, 0.38, 0.47, 22.0, 5.0, 0.40, 11.5, 1.2, 0.0),
-    Traits("pine", "Pinus strobus", Leaf.NEEDLE, 0.25, 0.38, 27.0, 4.2, 0.40, 8.0, 1.4, 0.0),
-    Traits("staghorn sumac", "Rhus typhina", Leaf.PINNATE, 0.32, 0.46, 5.5, 14.0, 0.50, 18.0, 1.0, 0.42),
-    Traits("tree-of-heaven", "Ailanthus altissima", Leaf.PINNATE, 0.48, 0.48, 21.0, 6.5, 0.50, 12.0, 0.8, 0.85),
+    Traits("oak", "Quercus rubra", Leaf.BROAD, 0.28, 0.45, 24.0, 4.5, 0.45, 11.0, 0.60, 0.0),
+    Traits("maple", "Acer rubrum", Leaf.BROAD, 0.38, 0.47, 22.0, 5.0, 0.40, 11.5, 0.65, 0.0),
+    Traits("pine", "Pinus strobus", Leaf.NEEDLE, 0.25, 0.38, 27.0, 4.2, 0.40, 8.0, 0.75, 0.0),
+    Traits("staghorn sumac", "Rhus typhina", Leaf.PINNATE, 0.32, 0.46, 5.5, 14.0, 0.50, 18.0, 0.6, 0.42),
+    Traits("tree-of-heaven", "Ailanthus altissima", Leaf.PINNATE, 0.48, 0.48, 21.0, 6.5, 0.50, 12.0, 0.45, 0.85),
     Traits("shrub", "Lonicera maackii", Leaf.BROAD, 0.30, 0.45, 3.0, 10.0, 0.2, 15.0, 2.0, 0.0),
     Traits("grass", "Poaceae", Leaf.BLADE, 0.30, 0.42, 0.5, 10.0, 0.0, 1.0, 4.0, 0.0),
 )

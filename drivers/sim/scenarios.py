@@ -1,0 +1,65 @@
+"""The walks there are, by name. A `WorldConfig` and nothing else decides the whole world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from drivers.errors import SimulationError
+from drivers.sim.imu import ImuConfig
+from drivers.sim.lidar import LidarConfig
+from drivers.sim.motion import Schedule
+
+
+@dataclass(frozen=True, slots=True)
+class Datum:
+    """Origin of the world frame (ENU): WGS 84 degrees and metres above the ellipsoid. geoid_m: separation there."""
+
+    latitude_deg: float = 40.0573
+    longitude_deg: float = -75.2183
+    height_m: float = 58.0
+    geoid_m: float = -33.6
+
+
+@dataclass(frozen=True, slots=True)
+class WorldConfig:
+    """forest, path and carrier are names (see `forest_config`, `paths`, `carriers`). shake scales hand shake."""
+
+    name: str = "demo"
+    seed: int = 7
+    forest: str = "mixed"
+    path: str = "loop"
+    length_m: float = 43.0
+    carrier: str = "handheld"
+    shake: float = 1.0
+    schedule: Schedule = field(default_factory=Schedule)
+    datum: Datum = field(default_factory=Datum)
+    lidar: LidarConfig = field(default_factory=LidarConfig)
+    imu: ImuConfig = field(default_factory=ImuConfig)
+
+
+SCENARIOS: dict[str, WorldConfig] = {
+    config.name: config
+    for config in (
+        WorldConfig(),
+        WorldConfig("open_trail", forest="open_trail", length_m=150.0),
+        WorldConfig("dense", forest="dense", length_m=120.0),
+        WorldConfig("thicket", forest="thicket", path="out_and_back", length_m=100.0),
+        WorldConfig("slope", forest="slope", length_m=150.0),
+        WorldConfig("meadow_edge", forest="meadow_edge", length_m=150.0),
+        WorldConfig("plantation", forest="plantation", length_m=200.0, carrier="backpack"),
+        WorldConfig("backpack", path="out_and_back", length_m=200.0, carrier="backpack"),
+        WorldConfig("bicycle", forest="open_trail", path="out_and_back", length_m=400.0, carrier="bicycle"),
+        WorldConfig("uav", length_m=200.0, carrier="uav"),
+        WorldConfig("shaking", length_m=80.0, shake=6.0),
+        WorldConfig("loop_800", length_m=800.0),
+        WorldConfig("loop_1200", length_m=1200.0),
+        WorldConfig("out_and_back_1200", path="out_and_back", length_m=1200.0, carrier="backpack"),
+    )
+}
+
+
+def scenario(name: str, seed: int | None = None) -> WorldConfig:
+    """The scenario of that name, with its own seed or another. SimulationError names the ones there are."""
+    if name not in SCENARIOS:
+        raise SimulationError(f"scenario {name!r}: expected one of {', '.join(SCENARIOS)}")
+    return SCENARIOS[name] if seed is None else replace(SCENARIOS[name], seed=seed)
