@@ -62,7 +62,8 @@ class GnssFix:
 
     sigma_enu_m: one-sigma east, north, up. sigma_source says where it is from ("gst", or the stated fallback).
     age_s: age of the differential corrections, None when the receiver gave none.
-    utc_ns: the receiver's own UTC epoch; date_assumed when no sentence had given the date yet.
+    utc_ns: the receiver's own UTC epoch, 0 when it did not know the time; date_assumed when no sentence had given the
+    date yet.
     """
 
     stamp_ns: int

@@ -58,7 +58,7 @@ class Sensor:
         """Receive until `stop` is set, opening the link anew whenever it goes."""
         while not stop.is_set():
             try:
-                link = open_link(self._endpoint, self._config.baud)
+                link = open_link(self._endpoint, self._config.baud, stop)
             except SensorUnreachable as error:
                 self._note_unreachable(str(error))
                 stop.wait(self._config.reconnect_s)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
 import select
 import socket
+import time
+from threading import Event
 from typing import Protocol
 
 import serial
@@ -18,6 +21,7 @@ from drivers.reach.config import SerialEndpoint, TcpEndpoint
 USB_VENDOR, USB_PRODUCT = 0x3032, 0x0013
 STABLE_PATHS = ("/dev/mapforest/gnss", "/dev/serial/by-id/*[Ee]mlid*", "/dev/serial/by-id/*[Rr]each*")
 CONNECT_TIMEOUT_S = 5.0
+STOP_LOOK_S = 0.1
 READ_BYTES = 4096
 
 
@@ -33,10 +37,13 @@ class Link(Protocol):
         """Idempotent."""
 
 
-def open_link(endpoint: SerialEndpoint | TcpEndpoint, baud: int) -> Link:
-    """An open link without old bytes in it. SensorUnreachable says why there is none, and what to do."""
+def open_link(endpoint: SerialEndpoint | TcpEndpoint, baud: int, stop: Event) -> Link:
+    """An open link without old bytes in it. SensorUnreachable says why there is none, and what to do.
+
+    A connection that nobody answers is given up after `CONNECT_TIMEOUT_S`, or as soon as `stop` is set.
+    """
     if isinstance(endpoint, TcpEndpoint):
-        return TcpLink(endpoint)
+        return TcpLink(endpoint, stop)
     return SerialLink(endpoint.path or find_device(), baud)
 
 
@@ -86,16 +93,15 @@ class SerialLink:
 class TcpLink:
     """A TCP connection to the receiver's position output."""
 
-    def __init__(self, endpoint: TcpEndpoint) -> None:
+    def __init__(self, endpoint: TcpEndpoint, stop: Event) -> None:
         self.address = f"{endpoint.host}:{endpoint.port}"
         try:
-            self._socket = socket.create_connection((endpoint.host, endpoint.port), CONNECT_TIMEOUT_S)
+            self._socket = _connect(endpoint, stop)
         except OSError as error:
             raise SensorUnreachable(
                 f"{self.address} does not answer ({error.strerror or error}): check the network, and that the position"
                 " output is a TCP server on that port"
             ) from error
-        self._socket.setblocking(False)
         self._poll = _poll_for(self._socket.fileno())
 
     def read(self, timeout_s: float) -> bytes:
@@ -113,6 +119,32 @@ class TcpLink:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def _connect(endpoint: TcpEndpoint, stop: Event) -> socket.socket:
+    """A connected, non-blocking socket; OSError. Host names are looked up at the first address they have."""
+    family, kind, protocol, _, address = socket.getaddrinfo(endpoint.host, endpoint.port, type=socket.SOCK_STREAM)[0]
+    link = socket.socket(family, kind, protocol)
+    link.setblocking(False)
+    code = _dial(link, address, stop)
+    if code:
+        link.close()
+        raise OSError(code, os.strerror(code))
+    return link
+
+
+def _dial(link: socket.socket, address: object, stop: Event) -> int:
+    """0 once connected, otherwise the error number."""
+    code = link.connect_ex(address)  # type: ignore[arg-type]  # as getaddrinfo gave it
+    poll = select.poll()
+    poll.register(link, select.POLLOUT)
+    deadline = time.monotonic() + CONNECT_TIMEOUT_S
+    while code == errno.EINPROGRESS:
+        if poll.poll(STOP_LOOK_S * 1000.0):
+            code = link.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        elif stop.is_set() or time.monotonic() > deadline:
+            code = errno.ETIMEDOUT
+    return code
 
 
 def _poll_for(descriptor: int) -> select.poll:

@@ -7,11 +7,12 @@ import threading
 import tty
 from contextlib import contextmanager
 
+import msgspec
 import pytest
 
 from drivers.driver import SensorState
 from drivers.messages import FixQuality, GnssFix, NmeaSentence, SensorEvent, Severity
-from drivers.reach.config import Config
+from drivers.reach.config import Config, SerialEndpoint, TcpEndpoint, parse_endpoint
 from drivers.reach.driver import Sensor
 from tests.drivers.reach import nmea_oracle
 from tests.waiting import wait_for
@@ -188,3 +189,36 @@ def test_bytes_that_are_no_nmea_are_said_to_be():
         wait_for(lambda: "no NMEA sentence among them" in sensor.health().problem)
         assert "baud" in sensor.health().advice
     assert not recorded.of(NmeaSentence)
+
+
+def test_a_host_that_does_not_answer_is_given_up_at_once_when_asked_to_stop():
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.31.9", 0))
+        deaf.listen(0)
+        address = deaf.getsockname()
+        waiting = []
+        for _ in range(3):  # fill the backlog: further attempts are left without an answer
+            client = socket.socket()
+            client.setblocking(False)
+            client.connect_ex(address)
+            waiting.append(client)
+        sensor, stop = Sensor("reach", Config(endpoint=f"tcp:{address[0]}:{address[1]}")), threading.Event()
+        thread = threading.Thread(target=sensor.run, args=(Recorded().append, stop), daemon=True)
+        thread.start()
+        wait_for(lambda: sensor.health().state is SensorState.SEARCHING)
+        stop.set()
+        thread.join(2.0)
+        assert not thread.is_alive()
+        for client in waiting:
+            client.close()
+
+
+@pytest.mark.parametrize("endpoint", ["usb", "serial:gnss", "tcp:", "tcp:host:0", "tcp::9001", "tcp:h:99999", ""])
+def test_an_endpoint_that_makes_no_sense_is_refused_with_an_example(endpoint):
+    with pytest.raises(msgspec.ValidationError, match=r"tcp:192\.168\.2\.15:9001"):
+        msgspec.convert({"endpoint": endpoint}, Config)
+
+
+def test_a_tcp_port_may_be_left_out():
+    assert parse_endpoint("tcp:reach.local") == TcpEndpoint("reach.local", 9001)
+    assert parse_endpoint("serial:auto") == SerialEndpoint("")
