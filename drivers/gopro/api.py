@@ -72,7 +72,7 @@ class Camera:
         self.address = address
         self._port = port
         self._source = (source, 0) if source else None
-        self._timeout_s = timeout_s
+        self.timeout_s = timeout_s
 
     def identify(self) -> CameraInfo:
         """Name, firmware, serial number. SensorUnsupported when it is another model."""
@@ -146,9 +146,9 @@ class Camera:
 
     def _exchange(self, path: str) -> tuple[int, bytes]:
         connection = http.client.HTTPConnection(
-            self.address, self._port, timeout=self._timeout_s, source_address=self._source
+            self.address, self._port, timeout=self.timeout_s, source_address=self._source
         )
-        deadline = time.monotonic() + self._timeout_s
+        deadline = time.monotonic() + self.timeout_s
         try:
             connection.request("GET", path, headers={"Connection": "close"})
             response = connection.getresponse()

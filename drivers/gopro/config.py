@@ -24,7 +24,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Start and stop the camera's own recording with the session (Wi-Fi only)."""
     set_clock: bool = True
     """Set the camera's clock to UTC when it is reached."""
-    settings: dict[str, int] = {"59": 0, "83": 1, "135": 0}
+    settings: dict[str, int] = msgspec.field(default_factory=lambda: {"59": 0, "83": 1, "135": 0})
     """Setting id to value, forced when the camera is reached: never off, GPS on, stabilisation off."""
     webcam_resolution: Literal[480, 720, 1080] = 1080
     webcam_fov: Literal["wide", "linear", "narrow", "superview"] = "wide"

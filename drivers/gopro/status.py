@@ -5,7 +5,7 @@ Ids and values: section 3 of the reference sheet. Any key may be missing on a HE
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +39,9 @@ class CameraStatus:
     group: int | None = None
     uptime_ms: int | None = None
     settings: dict[str, int] = field(default_factory=dict)
+
+
+Condition = Callable[[CameraStatus], bool]
 
 
 @dataclass(frozen=True, slots=True)

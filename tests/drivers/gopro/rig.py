@@ -1,0 +1,98 @@
+"""A tiny video, loopback addresses of its own, and a driver running in a thread, for the tests of the camera."""
+
+import itertools
+import random
+import threading
+import time
+from dataclasses import dataclass, field
+from functools import cache
+
+import av
+import numpy as np
+
+from drivers.gopro.config import Config
+from drivers.gopro.driver import Sensor
+from drivers.messages import SensorEvent, VideoFrame
+from drivers.sim.faults import FaultPlan, parse
+from drivers.sim.gopro_device import Quirks
+from drivers.sim.gopro_emulator import Emulator
+
+_numbers = itertools.count(random.SystemRandom().randrange(1, 1 << 22))
+
+
+def loopback_address() -> str:
+    """127.x.y.z that no other test uses."""
+    number = next(_numbers) % (1 << 24 - 2) + 0x10000
+    return f"127.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}.{number % 254 + 1}"
+
+
+@cache
+def tiny_units(count: int = 60, size: int = 64, gop: int = 10) -> tuple[bytes, ...]:
+    """H.264 access units in Annex B with parameter sets before each IDR, encoded by PyAV."""
+    codec = av.CodecContext.create("libx264", "w")
+    codec.width = codec.height = size
+    codec.pix_fmt = "yuv420p"
+    codec.framerate = 30
+    codec.gop_size = gop
+    codec.max_b_frames = 0
+    codec.options = {"preset": "ultrafast", "tune": "zerolatency", "x264-params": "repeat-headers=1:scenecut=0"}
+    pixels = np.random.default_rng(1)
+    packets = []
+    for index in range(count):
+        image = np.full((size, size, 3), index * 4 % 256, np.uint8)
+        image[: size // 2] = pixels.integers(0, 256, (size // 2, size, 3), np.uint8)
+        packets += codec.encode(av.VideoFrame.from_ndarray(image, "rgb24"))
+    packets += codec.encode(None)
+    return tuple(bytes(packet) for packet in packets)
+
+
+class TinySource:
+    """VideoSource of `tiny_units`, over and over; its frames can be told apart by their bytes."""
+
+    def access_unit(self, index: int) -> tuple[bytes, bool]:
+        units = tiny_units()
+        return units[index % len(units)], index % 10 == 0
+
+
+def emulator(*faults: str, quirks: Quirks | None = None, source=None, truth=None, address=None, port=0) -> Emulator:
+    plan = FaultPlan("gopro", [parse(fault) for fault in faults])
+    epoch_ns = time.monotonic_ns()
+    return Emulator(
+        source or TinySource(), plan, epoch_ns, address or loopback_address(), port, truth=truth, quirks=quirks
+    )
+
+
+@dataclass
+class Running:
+    """A driver at work. `frames` and `events` grow while it runs."""
+
+    config: Config
+    frames: list[VideoFrame] = field(default_factory=list)
+    events: list[SensorEvent] = field(default_factory=list)
+
+    def __enter__(self) -> "Running":
+        self.sensor = Sensor("gopro", self.config)
+        self.stop = threading.Event()
+        self.thread = threading.Thread(target=self.sensor.run, args=(self._emit, self.stop))
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.end()
+
+    def end(self) -> None:
+        self.stop.set()
+        self.thread.join(20)
+        assert not self.thread.is_alive()
+
+    def _emit(self, message) -> None:
+        (self.frames if isinstance(message, VideoFrame) else self.events).append(message)
+
+    def told(self, text: str) -> bool:
+        return any(text in event.text for event in list(self.events))
+
+
+def config(address: str, http_port: int, **changes) -> Config:
+    """Of a driver on its own loopback address, impatient."""
+    values = {"host": loopback_address(), "timeout_s": 1.0, "retry_s": 0.2, "poll_s": 0.5, "stall_s": 0.6, **changes}
+    return Config(address=address, http_port=http_port, **values)

@@ -1,0 +1,181 @@
+"""The driver against the emulated camera, end to end over loopback."""
+
+import threading
+from contextlib import contextmanager
+
+import pytest
+
+from drivers.driver import SensorState
+from drivers.sim.gopro_device import Quirks
+from tests.drivers.gopro.rig import Running, config, emulator, loopback_address, tiny_units
+from tests.waiting import wait_for
+
+
+@contextmanager
+def camera(*faults, **options):
+    emulated = emulator(*faults, **options)
+    emulated.start()
+    try:
+        yield emulated
+    finally:
+        emulated.stop()
+
+
+def of(emulated, **changes):
+    return config(emulated._address, emulated.http_port, **changes)
+
+
+def consecutive(frames):
+    """Whether the frames are the source's, in order, none missing."""
+    units = tiny_units()
+    first = units.index(frames[0].data)
+    return all(frame.data == units[(first + k) % len(units)] for k, frame in enumerate(frames))
+
+
+def test_wifi_streams_every_access_unit_byte_for_byte_from_a_keyframe_on():
+    with camera() as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: len(driver.frames) > 40)
+        frames = list(driver.frames)
+        assert frames[0].keyframe
+        assert consecutive(frames)
+        assert all(0 <= frame.receive_ns - frame.stamp_ns + 50_000_000 < 300_000_000 for frame in frames)
+        wait_for(lambda: driver.sensor.health().state is not SensorState.STARTING)
+        health = driver.sensor.health()
+        assert health.battery_percent is not None
+        assert health.details["firmware"] == "HD8.01.02.51.00"
+        assert health.streams[0].lost == 0
+        assert health.clock is not None
+
+
+def test_the_camera_is_set_up_as_configured_and_left_in_a_sane_state():
+    with camera() as emulated:
+        with Running(of(emulated)) as driver:
+            wait_for(lambda: driver.frames)
+            assert {"59": 0, "83": 1, "135": 0}.items() <= emulated.device.settings.items()
+            assert emulated.device.date.year >= 2024
+            driver.sensor.session_started()
+            wait_for(lambda: emulated.device.recording)
+        assert not emulated.device.recording
+        assert emulated.device.stream_to is None
+        assert not [thread for thread in threading.enumerate() if thread.name == "gopro-stream"]
+
+
+def test_the_session_starts_and_stops_the_recording_and_the_preview_goes_on():
+    with camera() as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: driver.frames)
+        driver.sensor.session_started()
+        wait_for(lambda: driver.told("camera recording started: shutter sent at"))
+        assert emulated.device.recording
+        before = len(driver.frames)
+        wait_for(lambda: len(driver.frames) > before + 10)
+        driver.sensor.session_stopped()
+        wait_for(lambda: driver.told("camera recording stopped"))
+        assert not emulated.device.recording
+        before = len(driver.frames)
+        wait_for(lambda: len(driver.frames) > before + 10)
+        assert emulated.device.requests.count("/gp/gpControl/execute?p1=gpStream&c1=restart") == 3
+
+
+def test_usb_streams_without_recording_and_leaves_webcam_mode():
+    with camera(quirks=Quirks(webcam_starts=1)) as emulated:
+        with Running(of(emulated, mode="usb")) as driver:
+            driver.sensor.session_started()
+            wait_for(lambda: len(driver.frames) > 20)
+            assert consecutive(list(driver.frames))
+            assert emulated.device.webcam == 2
+            assert not emulated.device.recording
+        assert emulated.device.webcam == 0
+        asked = list(emulated.device.requests)
+        assert asked.index("/gp/gpWebcam/STOP") < asked.index("/gp/gpWebcam/START?res=12&port=8554")
+
+
+def test_usb_asks_again_when_the_first_start_does_nothing(monkeypatch):
+    monkeypatch.setattr("drivers.gopro.streams.WEBCAM_WAITS_S", (0.4, 0.4))
+    with camera(quirks=Quirks(webcam_starts=2)) as emulated, Running(of(emulated, mode="usb")) as driver:
+        wait_for(lambda: len(driver.frames) > 5)
+
+
+def test_kept_alive_the_picture_never_freezes(monkeypatch):
+    monkeypatch.setattr("drivers.gopro.keepalive.INTERVAL_S", 0.3)
+    with camera(quirks=Quirks(frozen_after_s=0.6)) as emulated, Running(of(emulated, stall_s=60.0)) as driver:
+        wait_for(lambda: len(driver.frames) > 60)
+        assert consecutive(list(driver.frames))
+
+
+def test_a_silent_stream_is_started_again_and_then_the_operator_is_told_where_to_look():
+    with camera("gopro:stall@1.5") as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: driver.told("camera stream is silent"))
+        wait_for(lambda: "nothing arrives on UDP port 8554" in driver.sensor.health().problem)
+        health = driver.sensor.health()
+        assert health.state is SensorState.FAILED
+        assert "firewall" in health.advice
+
+
+def test_the_camera_goes_away_and_comes_back():
+    with camera("gopro:disconnect@1.5+1.5") as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: driver.told("camera lost"))
+        assert driver.sensor.health().state is SensorState.SEARCHING
+        wait_for(lambda: len([e for e in driver.events if "camera found" in e.text]) == 2)
+        before = len(driver.frames)
+        wait_for(lambda: len(driver.frames) > before + 10)
+
+
+def test_a_reboot_begins_a_new_clock_and_the_recording_starts_again(monkeypatch):
+    monkeypatch.setattr("drivers.sim.gopro_device.BOOT_S", 0.8)
+    monkeypatch.setattr("drivers.sim.gopro_device.READY_S", 0.2)
+    with camera("gopro:reboot@2") as emulated, Running(of(emulated)) as driver:
+        driver.sensor.session_started()
+        wait_for(lambda: emulated.device.recording)
+        wait_for(lambda: driver.told("stream clock began anew"), timeout_s=20)
+        wait_for(lambda: len([e for e in driver.events if "recording started" in e.text]) == 2)
+        clock = driver.sensor.health().clock
+        assert clock is not None
+        assert clock.steps == 1
+
+
+def test_a_camera_that_stays_busy_is_bounded_and_reported(monkeypatch):
+    monkeypatch.setattr("drivers.gopro.link.READY_S", 0.6)
+    monkeypatch.setattr("drivers.gopro.patience.WAIT_S", 0.5)
+    settings = {"set_clock": False, "settings": {}}
+    with camera(quirks=Quirks(always_busy=True)) as emulated, Running(of(emulated, **settings)) as driver:
+        wait_for(lambda: driver.sensor.health().state is SensorState.FAILED)
+        assert "refused with HTTP 500" in driver.sensor.health().problem
+        assert "error -3" in driver.sensor.health().problem
+
+
+def test_a_camera_that_will_not_record_streams_on_and_says_so():
+    with camera(quirks=Quirks(refuses_recording=True)) as emulated, Running(of(emulated)) as driver:
+        driver.sensor.session_started()
+        wait_for(lambda: driver.told("camera does not start recording"))
+        wait_for(lambda: "does not start recording" in driver.sensor.health().problem)
+        before = len(driver.frames)
+        wait_for(lambda: len(driver.frames) > before + 10)
+
+
+def test_another_model_is_refused_in_words():
+    with camera(quirks=Quirks(model_name="HERO7 Black")) as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: driver.sensor.health().state is SensorState.FAILED)
+        assert "HERO7 Black" in driver.sensor.health().problem
+
+
+def test_nobody_there_is_searching_and_stops_at_once():
+    with Running(config(loopback_address(), 1)) as driver:
+        wait_for(lambda: driver.sensor.health().problem)
+        assert driver.sensor.health().state is SensorState.SEARCHING
+        assert driver.sensor.health().advice
+
+
+@pytest.mark.parametrize("fault", ["gopro:duplicate=0.3", "gopro:reorder=0.2", "gopro:garbage=40"])
+def test_copies_swaps_and_rubbish_cost_nothing(fault):
+    with camera(fault) as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: len(driver.frames) > 40)
+        assert consecutive(list(driver.frames))
+        assert driver.sensor.health().streams[0].lost == 0
+
+
+def test_lost_datagrams_cost_only_their_frames_and_are_counted():
+    with camera("gopro:loss=0.05") as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: driver.sensor.health().streams[0].lost > 0)
+        whole = set(tiny_units())
+        assert all(frame.data in whole for frame in list(driver.frames))
+        assert int(driver.sensor.health().details["lost packets"]) > 0
