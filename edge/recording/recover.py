@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -40,7 +41,11 @@ _BLOCK = 4 << 20
 _LOOSE_CHUNK = 1 << 20
 
 
-def recover(source: Path, target: Path) -> RecoverReport:
+Progress = Callable[[int, int], None]
+"""Called with bytes done and bytes in all."""
+
+
+def recover(source: Path, target: Path, progress: Progress | None = None) -> RecoverReport:
     """Copy every sound chunk of `source` into the new file `target`, and say what was lost.
 
     Memory is bounded by the largest chunk. FormatError when `source` holds nothing of a recording, RecordingError
@@ -49,7 +54,7 @@ def recover(source: Path, target: Path) -> RecoverReport:
     with RecordFile(source) as file:
         _refuse_existing(source, target)
         try:
-            return _into(file, target)
+            return _into(file, target, progress)
         except OSError as error:
             raise RecordingError(
                 f"{target}: cannot be written: {error.strerror or error}; choose a folder with room, "
@@ -64,12 +69,12 @@ def _refuse_existing(source: Path, target: Path) -> None:
         raise RecordingError(f"{target} exists already; name another file to recover into, or move it away")
 
 
-def _into(file: RecordFile, target: Path) -> RecoverReport:
+def _into(file: RecordFile, target: Path, progress: Progress | None) -> RecoverReport:
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     part = Path(name)
     try:
         with os.fdopen(handle, "wb") as sink:
-            report = Copy(file, sink).run(target)
+            report = Copy(file, sink).run(target, progress)
             sink.flush()
             os.fsync(sink.fileno())
         shutil.copymode(file.path, part)
@@ -92,7 +97,7 @@ class Copy:
         self._ending = Ending()
         self._loose = bytearray()
 
-    def run(self, target: Path) -> RecoverReport:
+    def run(self, target: Path, progress: Progress | None = None) -> RecoverReport:
         """Copy everything sound and close the file."""
         pieces = survey(self._file)
         piece = next(pieces)  # raises before anything is written when this is no recording
@@ -105,6 +110,8 @@ class Copy:
                     self._loose_record(piece.record)
                 case DamagePiece():
                     self._losses.span(piece)
+            if progress is not None:
+                progress(piece.end, self._file.size)
             piece = next(pieces)
         self._losses.end(piece)
         self._flush_loose()

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import Enum
+from functools import total_ordering
 from typing import Literal
 
 import msgspec
 
 
-class Level(IntEnum):
-    """How bad a finding is. A NOTE does not touch the verdict."""
+@total_ordering
+class Level(Enum):
+    """How bad a finding is, ordered. A NOTE does not touch the verdict."""
 
-    NOTE = 0
-    WARN = 1
-    FAIL = 2
+    NOTE = "NOTE"
+    WARN = "WARN"
+    FAIL = "FAIL"
+
+    def __lt__(self, other: Level) -> bool:
+        return _RANK.index(self) < _RANK.index(other)
+
+
+_RANK = (Level.NOTE, Level.WARN, Level.FAIL)
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -95,5 +103,5 @@ def verdict_of(findings: tuple[Finding, ...]) -> Literal["PASS", "WARN", "FAIL"]
 
 def reasons_of(findings: tuple[Finding, ...]) -> tuple[str, ...]:
     """Findings that touch the verdict, worst first, as sentences."""
-    ranked = sorted((f for f in findings if f.level > Level.NOTE), key=lambda finding: -finding.level)
+    ranked = sorted((f for f in findings if f.level > Level.NOTE), key=lambda finding: finding.level, reverse=True)
     return tuple(f"{finding.text} {finding.advice}".strip() for finding in ranked)

@@ -90,7 +90,7 @@ def _fix_topic(recording: Recording, config: Config) -> str:
 
 def _ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Worst first; of equals, those about a topic before those about the whole."""
-    return tuple(sorted(findings, key=lambda finding: (-finding.level, not finding.topic)))
+    return tuple(sorted(findings, key=lambda finding: (finding.level, bool(finding.topic)), reverse=True))
 
 
 def _findings(evidence: Evidence) -> Iterator[Finding]:
