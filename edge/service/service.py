@@ -1,0 +1,159 @@
+"""The recorder service: everything put together, and the loop that watches it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from drivers import registry
+from drivers.driver import Driver
+from edge.config import Config, sensor_driver, sensor_settings
+from edge.control.messages import Reply, Request, Status
+from edge.paths import control_socket, recordings_folder
+from edge.recording.session import repair_leftovers
+from edge.service.control_server import ControlServer
+from edge.service.health import Health
+from edge.service.intake import Intake
+from edge.service.judge import Judge
+from edge.service.live import LiveView
+from edge.service.notify import Notifier
+from edge.service.recorder import SOFTWARE, Recorder
+from edge.service.supervisor import Plan, Supervisor
+
+log = logging.getLogger(__name__)
+
+TICK_S = 0.25
+LOOK_NS = 1_000_000_000
+
+
+class Service:
+    """The recorder. `run` returns when told to stop, with the session finished."""
+
+    def __init__(
+        self,
+        config: Config,
+        config_path: Path | None = None,
+        *,
+        plans: Sequence[Plan] | None = None,
+        judge: Judge | None = None,
+        notifier: Notifier | None = None,
+    ) -> None:
+        """plans, judge, notifier: others than the configured ones, for tests. ConfigError for a bad driver table."""
+        self._config = config
+        self._notifier = notifier or Notifier()
+        self._live = LiveView(config) if config.live.enabled else None
+        self._intake = Intake((self._live.offer,) if self._live else ())
+        self._supervisor = Supervisor(driver_plans(config) if plans is None else plans, self._intake.take)
+        self._judge = judge or Judge(config_path)
+        self._recorder = Recorder(config, self._intake, self._supervisor, self._judge)
+        self._health = Health(config, self._supervisor, self._intake, self._recorder, self._judge)
+        self._server = ControlServer(control_socket(config), self, config.control.group, SOFTWARE)
+        self._next_look_ns = 0
+        self._told = ""
+        self._ending: threading.Thread | None = None
+
+    def run(self, stop: threading.Event) -> None:
+        """Serve until `stop` is set. ControlError when another recorder is running."""
+        self._health.look(time.monotonic_ns())
+        self._server.start()
+        try:
+            self._start()
+            while not stop.wait(TICK_S):
+                self.tick(time.monotonic_ns())
+        finally:
+            self._shut_down()
+
+    def tick(self, now_ns: int) -> None:
+        """Four times a second: tell the clients; once a second: look at everything."""
+        if now_ns >= self._next_look_ns:
+            self._next_look_ns = now_ns + LOOK_NS
+            self._health.look(now_ns)
+            self._tell_systemd()
+        self._end_if_ended()
+        self._server.publish(self._health.status(now_ns))
+
+    def handle(self, request: Request, receive_ns: int) -> Reply:
+        """For the control server."""
+        return self._recorder.handle(request, receive_ns)
+
+    def status(self) -> Status:
+        """For the control server."""
+        return self._health.status(time.monotonic_ns())
+
+    def _start(self) -> None:
+        threading.Thread(target=self._repair, name="repair", daemon=True).start()
+        if self._live is not None:
+            self._live.start()
+            if self._live.problem:
+                self._health.notices.append(self._live.problem)
+        self._supervisor.start()
+        self._notifier.ready()
+        log.info("%s is up, control socket %s", SOFTWARE, control_socket(self._config))
+
+    def _shut_down(self) -> None:
+        self._notifier.stopping()
+        self._recorder.stop("the recorder was stopped")
+        self._supervisor.stop()
+        self._judge.close()
+        self._server.publish(self._health.status(time.monotonic_ns()))
+        self._server.stop()
+        if self._live is not None:
+            self._live.stop()
+        self._notifier.close()
+
+    def _tell_systemd(self) -> None:
+        if self._health.alive:
+            self._notifier.ping()
+        text = self._health.summary()
+        if text != self._told:
+            self._told = text
+            self._notifier.status(text)
+
+    def _end_if_ended(self) -> None:
+        """Finish a session whose writer gave up (disk reserve, disk error), beside the loop: a slow card takes long."""
+        status = self._recorder.session_status
+        busy = self._ending is not None and self._ending.is_alive()
+        if status is not None and status.ended and not busy and self._recorder.state == "recording":
+            log.error("session %s ended: %s", status.session, status.ended)
+            self._ending = threading.Thread(
+                target=self._recorder.stop, args=("its writer gave up",), name="ending", daemon=True
+            )
+            self._ending.start()
+
+    def _repair(self) -> None:
+        """Thread root."""
+        try:
+            for repair in repair_leftovers(recordings_folder(self._config)):
+                log.warning(
+                    "session %s was cut off; %s: %d messages kept, %d bytes lost %s",
+                    repair.session,
+                    repair.file,
+                    repair.messages,
+                    repair.lost_bytes,
+                    repair.error,
+                )
+                if repair.error:
+                    self._health.notices.append(f"session {repair.session} was cut off: {repair.error}")
+        except Exception as error:  # the thread's root: an odd file must not keep the payload from recording
+            log.exception("repair failed")
+            self._health.notices.append(f"old recordings could not be put in order ({error}); see the log")
+        finally:
+            self._recorder.repaired.set()
+
+
+def driver_plans(config: Config) -> list[Plan]:
+    """How to build each configured sensor's driver. ConfigError for a bad table; the drivers load in their threads."""
+    plans = []
+    for name in config.sensors:
+        settings = sensor_settings(config, name)
+        plans.append(Plan(name, partial(_build, sensor_driver(config, name), name, settings)))
+    return plans
+
+
+def _build(driver: str, name: str, settings: object) -> Driver:
+    built: Driver = registry.driver_type(driver)(name, settings)
+    return built
