@@ -114,8 +114,8 @@ class Recorder:
         mission = request.mission or self._config.mission.name
         anchor = Anchor.now()
         folder = session_folder(recordings_folder(self._config), mission, anchor)
-        session = self._open_session(folder, self._about(request, mission), self._config, anchor)
         try:
+            session = self._open_session(folder, self._about(request, mission), self._config, anchor)
             session.start()
         except EdgeError as error:
             self.problem = str(error)

@@ -48,7 +48,7 @@ class FakeDriver:
         self.told.append("stopped")
 
 
-def config(folder: Path, **live: object) -> Config:
+def config(folder: Path) -> Config:
     """Records below `folder`, with no sensor of its own."""
     return Config(
         recording=Recording(folder=str(folder / "recordings"), min_free_mib=0, min_free_percent=0.0),
