@@ -38,7 +38,9 @@ class Judge:
         self._closed = False
 
     def submit(self, folder: Path) -> None:
-        """Judge a session. Returns at once; the verdict says `running` until it is there."""
+        """Judge a session. Returns at once; the verdict says `running` until it is there. Nothing after `close`."""
+        if self._closed:
+            return
         self.verdict = Verdict(folder.name, "", running=True)
         threading.Thread(target=self._run, args=(folder,), name="judge", daemon=True).start()
 
@@ -72,6 +74,8 @@ class Judge:
         process = subprocess.Popen(self._command(folder), stdout=subprocess.PIPE, cwd=_PROGRAM_FOLDER)
         with process:
             self._process = process
+            if self._closed:
+                process.terminate()
             output, _ = process.communicate()
             self._process = None
         if process.returncode != 0:

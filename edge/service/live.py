@@ -43,6 +43,7 @@ class LiveView:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="live", daemon=True)
         self._server: Any = None
+        self._context: Any = None
         self._channels: dict[type, Any] = {}
         self.problem = ""
         """Why there is no live view, and what to do; empty when there is."""
@@ -91,7 +92,7 @@ class LiveView:
 
     def _open(self, foxglove: Any) -> None:
         live = self._config.live
-        context = foxglove.Context()
+        context = self._context = foxglove.Context()  # its channels close when nobody holds it
         kinds = channels(self._config.topics)
         opened: dict[str, Any] = {}
         for kind, channel in kinds.items():

@@ -96,9 +96,9 @@ class Service:
 
     def _shut_down(self) -> None:
         self._notifier.stopping()
+        self._judge.close()  # first: the session that ends now is validated when somebody asks for it
         self._recorder.stop("the recorder was stopped")
         self._supervisor.stop()
-        self._judge.close()
         self._server.publish(self._health.status(time.monotonic_ns()))
         self._server.stop()
         if self._live is not None:
