@@ -111,7 +111,7 @@ class SessionWriter:
         now_ns = self.last_progress_ns = self._clock()
         self.flush_ms = (now_ns - started_ns) / 1e6
         self._tally.flush_worst_ms = max(self._tally.flush_worst_ms, self.flush_ms)
-        period_ns = int(self._limits.flush_s * 1e9)
+        period_ns = int((self._limits.flush_s - _ROUND_S) * 1e9)  # a message may have waited a round already
         self._next_flush_ns = max(started_ns + period_ns, now_ns + period_ns // 5)
         self._watch_space()
 
