@@ -71,6 +71,8 @@ class SessionResult(msgspec.Struct, frozen=True, kw_only=True):
     dropped: dict[str, TopicDrops]
     splits: tuple[str, ...]
     """File names in order."""
+    not_kept: int = 0
+    """Messages the disk refused after they had left the queue; 0 unless there was a disk error."""
 
 
 class Verdict(msgspec.Struct, frozen=True):

@@ -37,6 +37,8 @@ class SessionRecord(msgspec.Struct, frozen=True, kw_only=True):
     messages: int = 0
     counts: dict[str, int] = {}
     dropped: dict[str, TopicDrops] = {}
+    not_kept: int = 0
+    """Messages the disk refused after they had left the queue; 0 unless there was a disk error."""
     splits: tuple[SplitFacts, ...] = ()
     gnss_quality: dict[str, int] = {}
     events: dict[str, int] = {}

@@ -231,6 +231,7 @@ class SessionRecorder:
             messages=sum(counts.values()),
             counts=counts,
             dropped=self._dropped(),
+            not_kept=splits.messages - sum(counts.values()) if state == "finished" else 0,
             splits=tuple(splits.finished),
             gnss_quality=dict(tally.gnss_quality),
             events=dict(tally.events),
@@ -254,4 +255,5 @@ class SessionRecorder:
             counts=counts,
             dropped=self._dropped(),
             splits=tuple(split.file for split in splits.finished),
+            not_kept=splits.messages - sum(counts.values()),
         )

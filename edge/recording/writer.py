@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import struct
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -51,6 +52,7 @@ class SessionWriter:
         self.flush_ms = 0.0
         self.free_bytes = disk.space(folder).free_bytes
         self.last_progress_ns = clock()
+        self._in_hand: deque[Recordable] = deque()
         self._queue = queue
         self._splits = splits
         self._tally = tally
@@ -62,7 +64,7 @@ class SessionWriter:
         self._clock = clock
         self._utc_offset = utc_offset
         self._next_flush_ns = clock() + _FIRST_FLUSH_NS
-        self._utc_offset_ns = anchor.offset_ns
+        self._utc_offset_ns = utc_offset()
 
     def run(self) -> None:
         """Thread root: write until the queue is closed and empty, then finish. Never raises."""
@@ -82,8 +84,10 @@ class SessionWriter:
         """One round: what the queue holds, and a flush when it is time. False when the queue is closed and empty."""
         closed = self._queue.closed
         batch = self._queue.take(_ROUND_S)
-        for message in batch:
-            self._write(message)
+        self._in_hand.extend(batch)
+        while self._in_hand:
+            self._write(self._in_hand[0])
+            self._in_hand.popleft()
         now_ns = self.last_progress_ns = self._clock()
         if now_ns >= self._next_flush_ns:
             self._flush(now_ns)
@@ -157,4 +161,6 @@ class SessionWriter:
         self.error = problem
         self.ended = self.ended or "disk error"
         self._queue.abandon()
+        for message in self._in_hand:
+            self._queue.count_drop(message)
         self._splits.abandon()

@@ -140,6 +140,9 @@ def test_a_disk_that_refuses_ends_the_session_with_everything_so_far(tmp_path, c
     assert sum(found.values()) >= 292
     assert (result.folder / result.splits[0]).stat().st_size >= flushed
     assert result.counts == found
+    queued = sum(drops.count for drops in result.dropped.values())
+    assert sum(found.values()) - found["/tf_static"] + result.not_kept + queued == len(second(0)) * 4
+    assert result.not_kept + queued > 0
 
 
 def test_recording_stops_at_the_reserve_and_says_why(tmp_path):
