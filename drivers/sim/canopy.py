@@ -1,12 +1,37 @@
-"""How much of the sky the crowns hide from above, along the walk."""
+"""What a GNSS antenna goes through: its true motion, and how much of the sky the crowns hide from it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from drivers.sim.scene import Doubles, Floats, Terrain, Trees
+from drivers.sim.trajectory import Trajectory
 
 AROUND_M = 8
+
+
+class Antenna:
+    """Position and velocity (3,) in ENU, and canopy cover 0..1, at any walk time."""
+
+    def __init__(
+        self, trajectory: Trajectory, terrain: Terrain, covered: Floats, lever_m: tuple[float, float, float]
+    ) -> None:
+        self._trajectory = trajectory
+        self._terrain = terrain
+        self._covered = covered
+        self._lever_m = lever_m
+
+    def position(self, t_ns: int) -> Doubles:
+        """(3,) metres."""
+        return self._trajectory.position(t_ns, self._lever_m)
+
+    def velocity(self, t_ns: int) -> Doubles:
+        """(3,) m/s, swing of the lever included."""
+        return self._trajectory.velocity(t_ns, self._lever_m)
+
+    def canopy(self, t_ns: int) -> float:
+        """0 open sky .. 1 closed."""
+        return float(self._terrain.sample(self._covered, self.position(t_ns)[None, :2])[0])
 
 
 def cover(trees: Trees, terrain: Terrain) -> Floats:

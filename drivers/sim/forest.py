@@ -45,7 +45,7 @@ def grow(config: ForestConfig, route: Route, terrain: Terrain | None = None, tre
         stems=crowns.stems(trees, rng),
         branches=_join_branches(wood, undergrowth.logs(config, terrain, distance, rng)),
         foliage=leaves,
-        boxes=furnish(route, terrain, config.furniture),
+        boxes=furnish(route, terrain, trees, config.furniture),
         trail=Trail(route.points_m, config.trail_width_m),
     )
 

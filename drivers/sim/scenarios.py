@@ -22,7 +22,10 @@ class Datum:
 
 @dataclass(frozen=True, slots=True)
 class WorldConfig:
-    """forest, path and carrier are names (see `forest_config`, `paths`, `carriers`). shake scales hand shake."""
+    """forest, path and carrier are names (see `forest_config`, `paths`, `carriers`). shake scales hand shake.
+
+    antenna_m: GNSS antenna in `base_link`, as in the default calibration.
+    """
 
     name: str = "demo"
     seed: int = 7
@@ -32,6 +35,7 @@ class WorldConfig:
     carrier: str = "handheld"
     shake: float = 1.0
     schedule: Schedule = field(default_factory=Schedule)
+    antenna_m: tuple[float, float, float] = (-0.05, 0.0, 0.20)
     datum: Datum = field(default_factory=Datum)
     lidar: LidarConfig = field(default_factory=LidarConfig)
     imu: ImuConfig = field(default_factory=ImuConfig)

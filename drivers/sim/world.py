@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from functools import cached_property
 
-import numpy.typing as npt
-
 from drivers.sim import forest
-from drivers.sim.canopy import cover
+from drivers.sim.canopy import Antenna, cover
 from drivers.sim.carriers import Carrier, carrier
 from drivers.sim.forest_config import ForestConfig, preset
 from drivers.sim.imu import Imu
@@ -17,7 +15,7 @@ from drivers.sim.paths import Route, route
 from drivers.sim.ray_grid import ray_grid
 from drivers.sim.ray_kernels import RayGrid
 from drivers.sim.scenarios import WorldConfig
-from drivers.sim.scene import Doubles, Floats, Scene, Terrain, Trees
+from drivers.sim.scene import Scene, Terrain, Trees
 from drivers.sim.trajectory import Trajectory
 
 
@@ -81,21 +79,10 @@ class World:
         """Source of inertial samples."""
         return Imu(self.trajectory, self.config.imu, self.config.seed)
 
-    def position(self, t_ns: int, lever_m: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Doubles:
-        """ENU position (3,) of `base_link`, or of a point at `lever_m` in it."""
-        return self.trajectory.position(t_ns, lever_m)
-
-    def velocity(self, t_ns: int, lever_m: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Doubles:
-        """ENU velocity (3,), as `position`."""
-        return self.trajectory.velocity(t_ns, lever_m)
-
-    def canopy(self, t_ns: int) -> float:
-        """Share of the sky overhead that crowns hide, 0..1."""
-        return float(self.terrain.sample(self._cover, self.position(t_ns)[None, :2])[0])
-
     @cached_property
-    def _cover(self) -> Floats:
-        return cover(self.trees, self.terrain)
+    def antenna(self) -> Antenna:
+        """What is true of the GNSS antenna."""
+        return Antenna(self.trajectory, self.terrain, cover(self.trees, self.terrain), self.config.antenna_m)
 
 
 def build(config: WorldConfig) -> World:

@@ -8,7 +8,7 @@ from drivers.sim import forest, paths
 from drivers.sim.crowns import SUNK_M
 from drivers.sim.forest_config import PRESETS, preset
 from drivers.sim.planting import SUCKER_SPACING_M, apart
-from drivers.sim.scene import Kind, Scene
+from drivers.sim.scene import Kind, Made, Scene
 from drivers.sim.species import Species
 
 
@@ -103,6 +103,20 @@ def test_tree_of_heaven_carries_long_fronds_and_oaks_none():
     assert foliage.frond_m[foliage.species == Species.OAK].max() == 0.0
     lengths = np.linalg.norm(foliage.frond[crown], axis=1)
     np.testing.assert_allclose(lengths, 1.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_tree_grows_through_a_bench_or_a_fence(seed):
+    scene = _scene("mixed", seed=seed, length_m=250.0)
+    boxes, stems = scene.boxes, scene.trees
+    assert {Made.BENCH, Made.FENCE_POST, Made.FENCE_RAIL, Made.SIGN} <= set(boxes.made.tolist())
+    for centre, half, yaw in zip(boxes.centre_m, boxes.half_m, boxes.yaw_rad, strict=True):
+        offset = stems.position_m[:, :2] - centre[:2]
+        ahead = np.abs(offset @ (np.cos(yaw), np.sin(yaw))) - half[0]
+        aside = np.abs(offset @ (-np.sin(yaw), np.cos(yaw))) - half[1]
+        outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0))
+        assert (outside > 0.5 * stems.dbh_m).all()
+        assert _distances(centre[None, :2], scene.trail.line_m).min() > 0.9
 
 
 def test_grass_and_shrubs_keep_off_the_trail():

@@ -33,17 +33,17 @@ def test_every_scenario_has_a_walk_clear_of_stems(name):
 
 def test_parts_are_built_only_when_asked_for():
     world = build(scenario("demo"))
-    world.position(3 * S)
+    world.trajectory.position(3 * S)
     assert "scene" not in vars(world)
     assert "trees" not in vars(world)
 
 
 def test_canopy_is_open_on_the_meadow_and_closed_in_the_thicket():
     meadow, thicket = build(scenario("meadow_edge")), build(scenario("thicket"))
-    cover = [meadow.canopy(t * S) for t in range(0, 140, 5)]
+    cover = [meadow.antenna.canopy(t * S) for t in range(0, 140, 5)]
     assert min(cover) < 0.3
     assert max(cover) > 0.6
-    assert min(thicket.canopy(t * S) for t in range(0, 100, 5)) > 0.6
+    assert min(thicket.antenna.canopy(t * S) for t in range(0, 100, 5)) > 0.6
 
 
 def test_unknown_scenario_is_refused():
@@ -57,7 +57,7 @@ def test_truth_on_disk_is_the_trajectory_and_the_inventory(tmp_path):
     poses = np.loadtxt(tmp_path / "poses.tum")
     assert poses[0, 0] == 0.0
     np.testing.assert_allclose(np.diff(poses[:, 0]), 0.01, atol=1e-9)
-    np.testing.assert_allclose(poses[1500, 1:4], world.position(15 * S), atol=1e-6)
+    np.testing.assert_allclose(poses[1500, 1:4], world.trajectory.position(15 * S), atol=1e-6)
     with (tmp_path / "stems.csv").open(encoding="utf-8") as file:
         stems = list(csv.DictReader(file))
     assert len(stems) == len(world.trees)
