@@ -23,6 +23,7 @@ log = logging.getLogger(__name__)
 
 _PROGRAM_FOLDER = Path(edge.__file__).parents[1]
 _NICENESS = 10
+_CLOSE_S = 2.0
 
 
 class Judge:
@@ -45,11 +46,13 @@ class Judge:
         threading.Thread(target=self._run, args=(folder,), name="judge", daemon=True).start()
 
     def close(self) -> None:
-        """Leave off. Idempotent."""
+        """Leave off, and wait a moment for that. Idempotent."""
         self._closed = True
         process = self._process
         if process is not None:
             process.terminate()
+        if self._lock.acquire(timeout=_CLOSE_S):
+            self._lock.release()
 
     def _run(self, folder: Path) -> None:
         """Thread root."""

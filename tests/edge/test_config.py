@@ -132,11 +132,27 @@ def test_the_effective_configuration_reads_back_as_itself(tmp_path: Path) -> Non
     assert load(again).validation == config.validation
 
 
-@pytest.mark.usefixtures("real_drivers")
 def test_the_sample_file_says_every_key_and_every_default() -> None:
     raw = toml_table.read(SAMPLE)
+    del raw["sensors"]
     assert toml_table.convert(raw, Config, str(SAMPLE)) == Config()
-    assert keys(raw) - {"sensors"} == keys(msgspec.to_builtins(Config())) - {"sensors"}
+    assert keys(raw) == keys(msgspec.to_builtins(Config())) - {"sensors"}
+
+
+@pytest.mark.usefixtures("real_drivers")
+@pytest.mark.parametrize("sensor", registry.DRIVERS)
+def test_the_sample_file_says_what_the_drivers_do_by_default(sensor: str) -> None:
+    config = Config(sensors=toml_table.read(SAMPLE)["sensors"])
+    assert list(config.sensors) == list(registry.DRIVERS)
+    assert sensor_settings(config, sensor) == registry.config_type(sensor)()
+
+
+@pytest.mark.usefixtures("real_drivers")
+def test_the_default_configuration_can_be_written_and_read_with_every_driver(tmp_path: Path) -> None:
+    path = tmp_path / "effective.toml"
+    path.write_text(to_toml(Config()), encoding="utf-8")
+    again = load(path)
+    assert all(sensor_settings(again, name) == sensor_settings(Config(), name) for name in Config().sensors)
 
 
 def keys(table: dict, path: str = "") -> set[str]:

@@ -21,6 +21,11 @@ from tests.waiting import wait_for
 ROOT = Path(__file__).parents[3]
 
 
+@pytest.fixture(autouse=True)
+def leave_logging_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("edge.cli.main._set_up_logging", lambda _verbose: None)
+
+
 @pytest.fixture
 def config_path(tmp_path: Path) -> Path:
     path = tmp_path / "mapforest.toml"
