@@ -47,7 +47,11 @@ def read_facts(path: Path) -> tuple[SplitFacts, list[Channel]]:
         for one in summary.channels.values()
     ]
     statistics = summary.statistics
-    counts = {one.topic: statistics.channel_message_counts.get(one.id, 0) for one in summary.channels.values()}
+    counts = {
+        one.topic: count
+        for one in summary.channels.values()
+        if (count := statistics.channel_message_counts.get(one.id, 0))
+    }
     start_ns, end_ns = statistics.message_start_time, statistics.message_end_time
     return SplitFacts(path.name, start_ns, end_ns, path.stat().st_size, counts), channels
 

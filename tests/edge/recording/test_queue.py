@@ -22,7 +22,7 @@ def test_messages_come_out_in_order_and_free_their_room_once_written():
 
 
 def test_newest_is_dropped_and_counted_by_kind():
-    queue = RecordQueue(100_000, 0)
+    queue = RecordQueue(110_000, 0)
     taken = [queue.put(scan(k * MS, 1000)) for k in range(10)]
     assert taken == [True] * 5 + [False] * 5
     drops = queue.drops()[LidarScan]

@@ -62,7 +62,7 @@ def test_facts_read_from_the_file_are_those_kept_while_writing(tmp_path):
     result = recorder.stop("operator")
     for facts in read_session(result.folder).splits:
         found, channels = read_facts(result.folder / facts.file)
-        assert {topic: count for topic, count in found.counts.items() if count} == facts.counts
+        assert found.counts == facts.counts
         assert (found.start_ns, found.end_ns, found.size_bytes) == (facts.start_ns, facts.end_ns, facts.size_bytes)
         assert len(channels) == 8
 
@@ -156,3 +156,19 @@ def test_a_stall_in_real_time_on_a_real_disk_loses_nothing(tmp_path):
         counts = Counter(connection.topic for connection, _, _ in bag.messages())
     assert counts == {"/tf_static": 1, "/livox/imu": 50, "/livox/lidar": 40}
     assert read_session(result.folder).flush_worst_ms > 500
+
+
+def test_a_fault_of_our_own_ends_the_session_readable_and_in_words(tmp_path, monkeypatch):
+    recorder = started(tmp_path, clock=FakeClock())
+    for k in range(100):
+        recorder.offer(video(k * MS, 100_000))
+    wait_for(lambda: recorder.status().messages == 101)
+    monkeypatch.setattr(writer_module.SessionWriter, "_write", lambda *_: 1 / 0)
+    recorder.offer(imu(S))
+    wait_for(lambda: recorder.status().ended)
+    result = recorder.stop("operator")
+    assert "ZeroDivisionError" in result.error
+    with AnyReader([result.folder]) as bag:
+        assert bag.message_count == sum(result.counts.values()) >= 90
+    assert result.dropped["/livox/imu"].count == 1
+    assert result.counts["/camera/video"] + result.not_kept == 100
