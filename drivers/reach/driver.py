@@ -63,12 +63,13 @@ class Sensor:
                 self._note_unreachable(str(error))
                 stop.wait(self._config.reconnect_s)
                 continue
-            self._note_open(link, emit)
+            self._note_open(link)
             try:
                 self._receive(link, emit, stop)
             except SensorUnreachable as error:
                 self._note_unreachable(str(error))
-                self._tell(emit, Severity.WARNING, str(error))
+                if self._link_sentences:
+                    self._tell(emit, Severity.WARNING, str(error))
                 stop.wait(self._config.reconnect_s)
             finally:
                 link.close()
@@ -104,6 +105,7 @@ class Sensor:
             if data:
                 heard_ns = now_ns
                 self._take_bytes(data, now_ns, emit)
+                self._builder.heard(now_ns)
             elif isinstance(self._endpoint, TcpEndpoint) and now_ns - heard_ns > self._config.silence_s * 1e9:
                 raise SensorUnreachable(f"{link.address} has been silent for {self._config.silence_s:g} s")
             self._finish(self._builder.expire(now_ns), emit)
@@ -117,6 +119,8 @@ class Sensor:
 
     def _take_sentence(self, frame: Frame, emit: Emit) -> None:
         record = self._parse(frame)
+        if self._link_sentences == 1:  # said here and not at the opening: a port that opens and closes would flood
+            self._tell(emit, Severity.INFO, f"receiving from {self._link_address}")
         if record is None:
             self._builder.heard(frame.receive_ns)
         else:
@@ -163,13 +167,12 @@ class Sensor:
             self._tell(emit, Severity.WARNING, text)
         return stamp_ns
 
-    def _note_open(self, link: Link, emit: Emit) -> None:
+    def _note_open(self, link: Link) -> None:
         with self._lock:
             self._framer.reset()
             self._link_problem, self._link_address = "", link.address
             self._open_ns = time.monotonic_ns()
             self._link_bytes = self._link_sentences = 0
-        self._tell(emit, Severity.INFO, f"connected to {link.address}")
 
     def _note_unreachable(self, problem: str) -> None:
         with self._lock:

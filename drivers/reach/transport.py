@@ -8,6 +8,7 @@ import glob
 import os
 import select
 import socket
+import termios
 import time
 from threading import Event
 from typing import Protocol
@@ -67,8 +68,12 @@ class SerialLink:
         self.address = path
         try:
             self._serial = serial.Serial(path, baud, timeout=0, exclusive=True)
-            self._serial.reset_input_buffer()
         except (OSError, ValueError) as error:
+            raise SensorUnreachable(_why_not_opened(path, error)) from error
+        try:
+            self._serial.reset_input_buffer()
+        except termios.error as error:  # taken away within the last millisecond
+            self._serial.close()
             raise SensorUnreachable(_why_not_opened(path, error)) from error
         self._poll = _poll_for(self._serial.fileno())
 
@@ -97,9 +102,10 @@ class TcpLink:
         self.address = f"{endpoint.host}:{endpoint.port}"
         try:
             self._socket = _connect(endpoint, stop)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # UnicodeError: a host name that can be none
+            reason = getattr(error, "strerror", None) or error
             raise SensorUnreachable(
-                f"{self.address} does not answer ({error.strerror or error}): check the network, and that the position"
+                f"{self.address} does not answer ({reason}): check the network, and that the position"
                 " output is a TCP server on that port"
             ) from error
         self._poll = _poll_for(self._socket.fileno())
@@ -153,7 +159,7 @@ def _poll_for(descriptor: int) -> select.poll:
     return poll
 
 
-def _why_not_opened(path: str, error: OSError | ValueError) -> str:
+def _why_not_opened(path: str, error: Exception) -> str:
     if not os.path.exists(path):
         return f"{path} does not exist: plug the Reach in, or correct the endpoint"
     if not os.access(path, os.R_OK | os.W_OK):

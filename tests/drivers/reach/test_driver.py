@@ -11,7 +11,9 @@ import msgspec
 import pytest
 
 from drivers.driver import SensorState
+from drivers.errors import SensorUnreachable
 from drivers.messages import FixQuality, GnssFix, NmeaSentence, SensorEvent, Severity
+from drivers.reach import health, transport
 from drivers.reach.config import Config, SerialEndpoint, TcpEndpoint, parse_endpoint
 from drivers.reach.driver import Sensor
 from tests.drivers.reach import nmea_oracle
@@ -92,9 +94,9 @@ def test_a_device_that_is_not_there_is_searched_for_and_found(tmp_path):
     link = tmp_path / "gnss"
     with running(endpoint=f"serial:{link}") as (sensor, recorded):
         wait_for(lambda: "does not exist" in sensor.health().problem)
-        health = sensor.health()
-        assert health.state is SensorState.SEARCHING
-        assert "plug the Reach in" in health.advice
+        found = sensor.health()
+        assert found.state is SensorState.SEARCHING
+        assert "plug the Reach in" in found.advice
         for _ in range(2):  # plugged in, taken away, plugged in again
             with pseudo_terminal() as (master, device):
                 link.symlink_to(device)
@@ -171,18 +173,19 @@ def test_no_fix_without_time_is_recorded_and_said():
         opened(sensor)
         os.write(master, burst)
         wait_for(lambda: recorded.of(GnssFix))
-        health = sensor.health()
+        found = sensor.health()
     (fix,) = recorded.of(GnssFix)
     assert fix.quality is FixQuality.INVALID
     assert fix.utc_ns == 0
     assert fix.stamp_ns == fix.receive_ns
     assert all(math.isnan(x) for x in (fix.latitude_deg, fix.longitude_deg, fix.height_m, *fix.sigma_enu_m))
-    assert health.state is SensorState.DEGRADED
-    assert "no fix" in health.problem
-    assert health.clock is None
+    assert found.state is SensorState.DEGRADED
+    assert "no fix" in found.problem
+    assert found.clock is None
 
 
-def test_bytes_that_are_no_nmea_are_said_to_be():
+def test_bytes_that_are_no_nmea_are_said_to_be(monkeypatch):
+    monkeypatch.setattr(health, "FIRST_SENTENCE_S", 0.1)
     with pseudo_terminal() as (master, device), running(endpoint=f"serial:{device}") as (sensor, recorded):
         opened(sensor)
         os.write(master, b"\xb5\x62\x01\x07" * 20)
@@ -222,3 +225,30 @@ def test_an_endpoint_that_makes_no_sense_is_refused_with_an_example(endpoint):
 def test_a_tcp_port_may_be_left_out():
     assert parse_endpoint("tcp:reach.local") == TcpEndpoint("reach.local", 9001)
     assert parse_endpoint("serial:auto") == SerialEndpoint("")
+
+
+def test_the_stable_name_is_taken_before_any_other_and_then_the_usb_product(monkeypatch):
+    class Port:
+        vid, pid, device = 0x3032, 0x0013, "/dev/ttyACM7"
+
+    names = {"/dev/mapforest/gnss": [], "/dev/serial/by-id/*[Rr]each*": ["/dev/serial/by-id/usb-Emlid_Reach-if02"]}
+    monkeypatch.setattr(transport.glob, "glob", lambda pattern: names.get(pattern, []))
+    monkeypatch.setattr(transport.list_ports, "comports", lambda: [Port()])
+    assert transport.find_device() == "/dev/serial/by-id/usb-Emlid_Reach-if02"
+    names["/dev/mapforest/gnss"] = ["/dev/mapforest/gnss"]
+    assert transport.find_device() == "/dev/mapforest/gnss"
+    names.clear()
+    assert transport.find_device() == "/dev/ttyACM7"
+    Port.pid = 0x0014
+    with pytest.raises(SensorUnreachable, match="data cable"):
+        transport.find_device()
+
+
+@pytest.mark.parametrize("endpoint", ["serial:/dev/null", "tcp:" + "a" * 70, "tcp:127.0.31.10:9"])
+def test_what_cannot_be_opened_is_searched_for_and_never_raises(endpoint):
+    with running(endpoint=endpoint) as (sensor, _):
+        wait_for(lambda: "looking for" not in sensor.health().problem)
+        found = sensor.health()
+    assert found.state is SensorState.SEARCHING
+    assert found.problem
+    assert found.advice

@@ -73,7 +73,7 @@ def test_every_epoch_arrives_at_its_instant(tmp_path, tcp):
     truth = {line["sensor_ns"]: line["host_ns"] for line in map(json.loads, setup.truth.read_text().splitlines())}
     for fix in fixes[1:-1]:  # the link was opened and closed in the midst of the others
         assert truth[fix.utc_ns] / 1e9 == pytest.approx(setup.epoch_ns / 1e9 + setup.walk_s(fix), abs=1e-3)
-        assert 0 <= fix.stamp_ns - truth[fix.utc_ns] < 500_000_000
+        assert 0 <= fix.stamp_ns - truth[fix.utc_ns] < 1_000_000_000
         assert fix.quality is FixQuality.RTK_FIXED
         assert (fix.satellites, fix.age_s, fix.sigma_enu_m) == (20, 1.2, (0.011, 0.012, 0.02))
         assert fix.sigma_source.startswith("gst")
@@ -92,7 +92,7 @@ def test_a_link_that_vanishes_is_taken_up_again(tmp_path, tcp):
         wait_for(lambda: setup.sensor.health().state is SensorState.SEARCHING)
         lost_s = max(map(setup.walk_s, setup.fixes()))
         wait_for(lambda: setup.walk_s(setup.fixes()[-1]) > lost_s + 1.0)
-    assert "connected to" in setup.of(SensorEvent)[-1].text
+    assert "receiving from" in setup.of(SensorEvent)[-1].text
     assert setup.sensor.health().streams[0].lost >= 5
 
 
@@ -103,7 +103,7 @@ def test_a_reboot_is_survived_without_a_false_fix(tmp_path):
         count = len(setup.fixes())
         wait_for(lambda: len(setup.fixes()) > count + 3)
     for fix in setup.fixes():
-        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=0.5)
+        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=1.0)
 
 
 def test_garbage_and_damage_cost_sentences_and_never_make_false_ones(tmp_path):
@@ -113,7 +113,7 @@ def test_garbage_and_damage_cost_sentences_and_never_make_false_ones(tmp_path):
     for message in setup.of(NmeaSentence):
         assert nmea_oracle.valid_sentences(message.sentence.encode() + b"\r\n") == [message.sentence]
     for fix in setup.fixes():
-        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=0.5)
+        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=1.0)
     utc_ns = [fix.utc_ns for fix in setup.fixes()]
     assert utc_ns == sorted(set(utc_ns))
 
@@ -130,7 +130,7 @@ def test_a_clock_step_becomes_an_event_and_the_stamps_stay(tmp_path):
     assert health.clock is not None
     assert health.clock.steps == 1
     for fix in setup.fixes():
-        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=0.5)
+        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=1.0)
 
 
 def test_many_clients_get_the_same_bytes(tmp_path):
@@ -144,3 +144,26 @@ def test_many_clients_get_the_same_bytes(tmp_path):
     texts = [nmea_oracle.valid_sentences(data) for data in heard]
     assert len(texts[0]) >= 8
     assert len(set(texts[0]) & set(texts[1]) & set(texts[2])) >= 8
+
+
+def test_new_year_passes_without_a_gap(tmp_path):
+    new_year_ns = 1_704_067_200 * 10**9  # date -u -d 2024-01-01 +%s
+    setup = Setup(tmp_path, tcp=True, utc_epoch_ns=new_year_ns - 1_500_000_000)
+    with setup.emulator(), setup.driver():
+        wait_for(lambda: setup.fixes() and setup.fixes()[-1].utc_ns > new_year_ns + 300_000_000)
+    utc_ns = [fix.utc_ns for fix in setup.fixes()]
+    assert utc_ns[0] < new_year_ns
+    assert {b - a for a, b in pairwise(utc_ns)} == {100_000_000}
+    assert not any(fix.date_assumed for fix in setup.fixes())
+
+
+def test_a_receiver_that_falls_silent_is_missed_and_found(tmp_path):
+    setup = Setup(tmp_path, faults=["stall@1+1.2"])
+    with setup.emulator(), setup.driver():
+        seen = []
+        wait_for(lambda: seen.append(setup.sensor.health()) or "no epoch for" in seen[-1].problem)
+        assert seen[-1].state is SensorState.DEGRADED
+        count = len(setup.fixes())
+        wait_for(lambda: len(setup.fixes()) > count)
+        wait_for(lambda: setup.sensor.health().state is SensorState.OK)
+    assert setup.sensor.health().streams[0].lost >= 9
