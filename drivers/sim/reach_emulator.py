@@ -67,7 +67,7 @@ def run(
     """Emulate until `stop` is set.
 
     epoch_ns: monotonic instant at which the walk's t_ns is 0. pty: symbolic link to make to the pseudo-terminal.
-    tcp: loopback address and port to listen on. truth: file for lines of {"host_ns", "sensor_ns"}, one an epoch;
+    tcp: loopback address and port to listen on. truth: file to append lines of {"host_ns", "sensor_ns"}, one an epoch;
     sensor_ns is the UTC the receiver gives to the monotonic instant host_ns. SimulationError for a bad address.
     """
     settings = settings or ReachSettings()
@@ -123,7 +123,7 @@ class Receiver:
 
     def run(self, stop: StopEvent, truth: Path | None = None) -> None:
         """Until `stop` is set."""
-        record = None if truth is None else truth.open("w", encoding="utf-8")
+        record = None if truth is None else truth.open("a", encoding="utf-8")
         next_utc_ns = self._next_utc_ns(time.monotonic_ns())
         try:
             while not stop.is_set():
