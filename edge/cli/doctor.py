@@ -17,7 +17,7 @@ from edge.errors import ControlError
 from edge.paths import find_control_socket
 from edge.preflight import disk, host, sensors
 from edge.preflight.check import Check, Outcome
-from edge.service.host import clock_state
+from edge.service.host_clock import discipline
 
 HELP = """check sensors, clocks, card, permissions and calibration before a walk
 
@@ -56,7 +56,7 @@ def _running(config: Config) -> Status | None:
 
 
 def _checks(config: Config, status: Status | None, listen_s: float) -> list[Check]:
-    clock = clock_state()
+    clock = discipline()
     recorder = Check("recorder", Outcome.GOOD, f"running, {status.state}") if status else _not_running()
     return [
         recorder,
