@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any
 
 from drivers.driver import Driver, SensorHealth, SensorState
-from drivers.registry import config_type, driver_type
-from edge.config import Config
+from drivers.registry import driver_type
+from edge.config import Config, sensor_driver, sensor_settings
 from edge.control.messages import Sensor, Status
 from edge.preflight.check import Check, Outcome
 
@@ -30,7 +29,7 @@ def check_running(status: Status) -> list[Check]:
 
 def check_directly(config: Config, listen_s: float = LISTEN_S) -> list[Check]:
     """Start each driver without recording, and wait until it delivers or `listen_s` is over."""
-    drivers = [_build(name, table) for name, table in config.sensors.items()]
+    drivers = [_build(config, name) for name in config.sensors]
     stop = threading.Event()
     threads = [threading.Thread(target=d.run, args=(_ignore, stop), name=f"doctor-{d.name}") for d in drivers]
     for thread in threads:
@@ -43,9 +42,8 @@ def check_directly(config: Config, listen_s: float = LISTEN_S) -> list[Check]:
             thread.join(timeout=10.0)
 
 
-def _build(name: str, table: dict[str, Any]) -> Driver:
-    options = {key: value for key, value in table.items() if key != "driver"}
-    driver: Driver = driver_type(table["driver"])(name, config_type(table["driver"])(**options))
+def _build(config: Config, name: str) -> Driver:
+    driver: Driver = driver_type(sensor_driver(config, name))(name, sensor_settings(config, name))
     return driver
 
 

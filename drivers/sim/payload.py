@@ -1,0 +1,200 @@
+"""The emulated payload: three sensors in their own processes, one world, one start."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from drivers.errors import SimulationError
+from drivers.sim.camera import Camera
+from drivers.sim.faults import SENSORS, Fault, FaultPlan
+from drivers.sim.gnss import ReceiverModel
+from drivers.sim.gnss_errors import PRESETS
+from drivers.sim.scenarios import WorldConfig
+from drivers.sim.scene import Doubles
+from drivers.sim.world import World, build
+
+ANTENNA_M = (-0.05, 0.0, 0.20)
+"""Lever arm of the antenna in `base_link`, as in the nominal geometry."""
+READY_S = 180.0
+"""The first start on a machine compiles the ray caster and the rasteriser: half a minute on one slow core."""
+LEAD_NS = 200_000_000
+_PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadConfig:
+    """gnss: a preset of `gnss_errors`. truth: folder for what is true, None for none. Addresses are on loopback."""
+
+    world: WorldConfig = field(default_factory=WorldConfig)
+    gnss: str = "honest"
+    faults: tuple[Fault, ...] = ()
+    truth: Path | None = None
+    sensors: tuple[str, ...] = SENSORS
+    livox_address: str = "127.0.1.10"
+    reach_address: tuple[str, int] = ("127.0.1.20", 9001)
+    reach_pty: Path | None = None
+    gopro_address: tuple[str, int] = ("127.0.1.30", 8080)
+
+    def driver_tables(self) -> dict[str, dict[str, Any]]:
+        """`sensors` of a recorder's configuration that reaches this payload."""
+        tables: dict[str, dict[str, Any]] = {
+            "livox": {"driver": "livox", "address": self.livox_address, "host_address": "127.0.0.1"},
+            "reach": {"driver": "reach", "endpoint": "tcp:{}:{}".format(*self.reach_address)},
+            "gopro": {"driver": "gopro", "address": self.gopro_address[0], "http_port": self.gopro_address[1]},
+        }
+        return {name: tables[name] for name in self.sensors}
+
+
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """What the processes have in common. epoch_ns is 0 until all are ready."""
+
+    epoch_ns: Any
+    stop: Event
+
+
+class Payload:
+    """`with Payload(config) as payload:` has all emulators running; leaving it ends them."""
+
+    def __init__(self, config: PayloadConfig) -> None:
+        if config.gnss not in PRESETS:
+            raise SimulationError(f"GNSS errors {config.gnss!r}: expected one of {', '.join(PRESETS)}")
+        self.config = config
+        self._context: SpawnContext = multiprocessing.get_context("spawn")
+        self._shared = _Shared(self._context.Value("q", 0), self._context.Event())
+        self._processes: dict[str, SpawnProcess] = {}
+
+    @property
+    def epoch_ns(self) -> int:
+        """CLOCK_MONOTONIC at which walk time is 0."""
+        return int(self._shared.epoch_ns.value)
+
+    @property
+    def processes(self) -> dict[str, SpawnProcess]:
+        """The emulators by name, for whoever wants to measure or kill one."""
+        return dict(self._processes)
+
+    def __enter__(self) -> Payload:
+        if self.config.truth is not None:
+            self.config.truth.mkdir(parents=True, exist_ok=True)
+            build(self.config.world).write_truth(self.config.truth)
+        ready = {name: self._spawn(name) for name in self.config.sensors}
+        try:
+            self._wait(ready, READY_S)
+        except SimulationError:
+            self.close()
+            raise
+        self._shared.epoch_ns.value = time.monotonic_ns() + LEAD_NS
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def restart(self, name: str) -> None:
+        """Start an emulator that was killed again; the walk goes on where it is now."""
+        self._wait({name: self._spawn(name)}, READY_S)
+
+    def close(self) -> None:
+        """End all emulators."""
+        self._shared.stop.set()
+        for process in self._processes.values():
+            process.join(timeout=5.0)
+            if process.is_alive():
+                process.kill()
+                process.join()
+
+    def _spawn(self, name: str) -> Event:
+        ready = self._context.Event()
+        target = {"livox": _livox, "reach": _reach, "gopro": _gopro}[name]
+        arguments = (target, self.config, self._shared, ready)
+        process = self._context.Process(target=_emulate, args=arguments, name=f"emulated-{name}", daemon=True)
+        process.start()
+        self._processes[name] = process
+        return ready
+
+    def _wait(self, ready: dict[str, Event], timeout_s: float) -> None:
+        deadline_s = time.monotonic() + timeout_s
+        for name, event in ready.items():
+            while not event.wait(0.2):
+                if not self._processes[name].is_alive():
+                    raise SimulationError(f"the emulated {name} ended while starting; its error stands above")
+                if time.monotonic() > deadline_s:
+                    raise SimulationError(f"the emulated {name} was not ready within {timeout_s:.0f} s")
+
+
+def _emulate(body: Callable[..., None], config: PayloadConfig, shared: _Shared, ready: Event) -> None:
+    """Root of an emulator's process. Ctrl-C is the parent's to handle; when the parent is killed, so is this."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+    def start() -> int:
+        """Tell that everything slow is done, and wait for the common start."""
+        ready.set()
+        while shared.epoch_ns.value == 0 and not shared.stop.wait(0.005):
+            continue
+        return int(shared.epoch_ns.value)
+
+    body(config, build(config.world), shared, start)
+
+
+def _truth(config: PayloadConfig, name: str) -> Path | None:
+    return None if config.truth is None else config.truth / f"clock_{name}.jsonl"
+
+
+def _livox(config: PayloadConfig, world: World, shared: _Shared, start: Callable[[], int]) -> None:
+    from drivers.sim import livox_emulator  # each process loads its own sensor only
+
+    lidar, imu = world.lidar, world.imu
+    lidar.cast(0, 9600)  # compiles
+    plan = FaultPlan("livox", config.faults)
+    address, truth = config.livox_address, _truth(config, "livox")
+    livox_emulator.run(lidar, imu, plan, start(), shared.stop, address=address, truth_path=truth)
+
+
+class _Antenna:
+    """The true motion of the antenna, as `drivers.sim.gnss.AntennaTruth`."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.canopy = world.canopy
+
+    def position(self, t_ns: int) -> Doubles:
+        return self._world.position(t_ns, ANTENNA_M)
+
+    def velocity(self, t_ns: int) -> Doubles:
+        return self._world.velocity(t_ns, ANTENNA_M)
+
+
+def _reach(config: PayloadConfig, world: World, shared: _Shared, start: Callable[[], int]) -> None:
+    from drivers.sim import reach_emulator
+
+    source = ReceiverModel(_Antenna(world), PRESETS[config.gnss], config.world.datum)
+    source.epoch(0)
+    plan = FaultPlan("reach", config.faults)
+    links = {"pty": config.reach_pty, "tcp": config.reach_address}
+    reach_emulator.run(source, plan, start(), shared.stop, truth=_truth(config, "reach"), **links)
+
+
+def _gopro(config: PayloadConfig, world: World, shared: _Shared, start: Callable[[], int]) -> None:
+    from drivers.sim import gopro_emulator
+    from drivers.sim.renderer import Renderer
+    from drivers.sim.video import RenderedVideo
+
+    camera = Camera()
+    renderer = Renderer(world.scene, world.trajectory, camera, config.world.seed)
+    renderer.render(0)  # compiles
+    video = RenderedVideo(renderer, camera.width_px, camera.height_px)
+    plan = FaultPlan("gopro", config.faults)
+    gopro_emulator.run(video, plan, start(), shared.stop, address=config.gopro_address, truth=_truth(config, "gopro"))

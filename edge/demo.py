@@ -1,0 +1,162 @@
+"""The whole mission on the emulated payload: up, record the walk, judge the recording, compare clocks with the truth."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.sim.payload import Payload, PayloadConfig
+from drivers.sim.scenarios import WorldConfig
+from drivers.sim.world import build
+from edge import toml_table
+from edge.control.client import ControlClient
+from edge.control.messages import Request, Status, Verdict
+from edge.errors import ControlError, EdgeError
+
+UP_S = 60.0
+VERDICT_S = 60.0
+TAIL_S = 1.0
+"""Recorded at rest after the walk."""
+POLL_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Folders of one run of the demonstration."""
+
+    folder: Path
+
+    @property
+    def config(self) -> Path:
+        """The recorder's configuration."""
+        return self.folder / "mapforest.toml"
+
+    @property
+    def socket(self) -> Path:
+        """The recorder's control socket."""
+        return self.folder / "control.sock"
+
+    @property
+    def truth(self) -> Path:
+        """What is true of the simulated walk."""
+        return self.folder / "truth"
+
+    @property
+    def log(self) -> Path:
+        """What the recorder says."""
+        return self.folder / "recorder.log"
+
+
+Watch = Callable[[Status, float], None]
+"""Shown each new state with the share of the walk that is done."""
+
+
+def payload_config(stage: Stage, world: WorldConfig) -> PayloadConfig:
+    """The emulated payload of the demonstration."""
+    return PayloadConfig(world=world, truth=stage.truth)
+
+
+def prepare(stage: Stage, payload: PayloadConfig) -> None:
+    """Write the recorder's configuration."""
+    stage.folder.mkdir(parents=True, exist_ok=True)
+    # Small enough a reserve to run on a laptop's disk; everything else is as on the payload.
+    table = {
+        "recording": {"folder": str(stage.folder / "recordings"), "min_free_mib": 256, "min_free_percent": 0.5},
+        "mission": {"name": "demo", "carrier": payload.world.carrier},
+        "control": {"socket": str(stage.socket)},
+        "sensors": payload.driver_tables(),
+    }
+    stage.config.write_text(toml_table.render(table), encoding="utf-8")
+
+
+@contextmanager
+def recorder(stage: Stage) -> Iterator[ControlClient]:
+    """The recorder as a process of its own, as systemd would run it; stopped politely at the end."""
+    command = [sys.executable, "-m", "edge.cli.main", "recorder", "--config", str(stage.config)]
+    with stage.log.open("w", encoding="utf-8") as log:
+        process = subprocess.Popen(command, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True)
+    try:
+        with _connect(stage, process) as client:
+            yield client
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=60)
+
+
+def _connect(stage: Stage, process: subprocess.Popen[bytes]) -> ControlClient:
+    deadline_s = time.monotonic() + UP_S
+    while time.monotonic() < deadline_s:
+        if process.poll() is not None:
+            raise EdgeError(f"the recorder ended at once; its words are in {stage.log}:\n{_tail(stage.log)}")
+        try:
+            client = ControlClient(stage.socket)
+            client.connect()
+        except ControlError:
+            time.sleep(0.1)
+        else:
+            return client
+    raise EdgeError(f"the recorder did not open its control socket within {UP_S:.0f} s; see {stage.log}")
+
+
+def _tail(log: Path) -> str:
+    return os.linesep.join(log.read_text(encoding="utf-8", errors="replace").splitlines()[-5:])
+
+
+def wait_for_sensors(client: ControlClient, watch: Watch) -> None:
+    """Until every sensor delivers. EdgeError names those that do not."""
+    deadline_s = time.monotonic() + UP_S
+    while True:
+        status = client.status()
+        watch(status, 0.0)
+        late = [s for s in status.sensors if s.state not in {"ok", "degraded"}]
+        if not late:
+            return
+        if time.monotonic() > deadline_s:
+            told = "; ".join(f"{s.name} {s.state}: {s.problem}" for s in late)
+            raise EdgeError(f"sensors not ready after {UP_S:.0f} s: {told}")
+        time.sleep(POLL_S)
+
+
+def record_walk(client: ControlClient, payload: Payload, watch: Watch) -> Path:
+    """Start, wait for the walk to end, stop. Returns the session's folder."""
+    walk_ns = build(payload.config.world).trajectory.duration_ns
+    end_ns = payload.epoch_ns + walk_ns + int(TAIL_S * 1e9)
+    reply = client.request(Request("start", mission="demo"))
+    while (now_ns := time.monotonic_ns()) < end_ns:
+        watch(client.status(), (now_ns - payload.epoch_ns) / (end_ns - payload.epoch_ns))
+        time.sleep(POLL_S)
+    client.request(Request("mark", text="end of the walk"))
+    client.request(Request("stop"))
+    return Path(reply.folder)
+
+
+def wait_for_verdict(client: ControlClient, watch: Watch) -> Verdict:
+    """The validator's word on the session just stopped."""
+    deadline_s = time.monotonic() + VERDICT_S
+    while time.monotonic() < deadline_s:
+        status = client.status()
+        watch(status, 1.0)
+        if status.verdict is not None and not status.verdict.running:
+            return status.verdict
+        time.sleep(0.2)
+    raise EdgeError(f"no verdict within {VERDICT_S:.0f} s after the stop")
+
+
+def clean_truth(stage: Stage) -> None:
+    """Clock truth is appended to by the emulators; an old run's must not mix in."""
+    for path in stage.truth.glob("clock_*.jsonl"):
+        path.unlink()
+
+
+def summary(folder: Path) -> dict[str, object]:
+    """`session.json` of a session."""
+    loaded: dict[str, object] = json.loads((folder / "session.json").read_text(encoding="utf-8"))
+    return loaded
