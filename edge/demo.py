@@ -1,4 +1,4 @@
-"""The whole mission on the emulated payload: up, record the walk, judge the recording, compare clocks with the truth."""
+"""The whole mission on the emulated payload: up, record the walk, judge the recording, compare with the truth."""
 
 from __future__ import annotations
 

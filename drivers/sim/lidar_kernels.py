@@ -1,6 +1,6 @@
 """Point slots of the simulated Mid-360: where each laser looks, what it meets, what the sensor makes of it."""
 
-# ruff: noqa: PLR0912, PLR0915, PLR0917 - a kernel that follows one beam from mirror to packet
+
 
 from __future__ import annotations
 

@@ -21,6 +21,7 @@ from drivers.sim.gnss import ReceiverModel
 from drivers.sim.gnss_errors import PRESETS
 from drivers.sim.scenarios import WorldConfig
 from drivers.sim.scene import Doubles
+from drivers.sim.truth import write_truth
 from drivers.sim.world import World, build
 
 ANTENNA_M = (-0.05, 0.0, 0.20)
@@ -86,8 +87,7 @@ class Payload:
 
     def __enter__(self) -> Payload:
         if self.config.truth is not None:
-            self.config.truth.mkdir(parents=True, exist_ok=True)
-            build(self.config.world).write_truth(self.config.truth)
+            write_truth(build(self.config.world), self.config.truth)
         ready = {name: self._spawn(name) for name in self.config.sensors}
         try:
             self._wait(ready, READY_S)
@@ -183,8 +183,8 @@ def _reach(config: PayloadConfig, world: World, shared: _Shared, start: Callable
     source = ReceiverModel(_Antenna(world), PRESETS[config.gnss], config.world.datum)
     source.epoch(0)
     plan = FaultPlan("reach", config.faults)
-    links = {"pty": config.reach_pty, "tcp": config.reach_address}
-    reach_emulator.run(source, plan, start(), shared.stop, truth=_truth(config, "reach"), **links)
+    pty, tcp, truth = config.reach_pty, config.reach_address, _truth(config, "reach")
+    reach_emulator.run(source, plan, start(), shared.stop, pty=pty, tcp=tcp, truth=truth)
 
 
 def _gopro(config: PayloadConfig, world: World, shared: _Shared, start: Callable[[], int]) -> None:

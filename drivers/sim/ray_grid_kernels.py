@@ -1,6 +1,6 @@
 """Which solids stand over which cell of the terrain, and how high there."""
 
-# ruff: noqa: PLR0917 - kernels take numbers
+
 
 from __future__ import annotations
 

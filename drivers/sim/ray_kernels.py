@@ -6,7 +6,7 @@ ellipsoids centre x y z, horizontal, vertical semi-axis, extinction a metre, ref
 boxes      centre x y z, half edges x y z, cos yaw, sin yaw, reflectivity
 """
 
-# ruff: noqa: PLR0912, PLR0915, PLR0917 - kernels take numbers and branch on geometry
+
 
 from __future__ import annotations
 

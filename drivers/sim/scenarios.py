@@ -5,19 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from drivers.errors import SimulationError
+from drivers.sim.gnss_geodesy import Datum
 from drivers.sim.imu import ImuConfig
 from drivers.sim.lidar import LidarConfig
 from drivers.sim.motion import Schedule
 
-
-@dataclass(frozen=True, slots=True)
-class Datum:
-    """Origin of the world frame (ENU): WGS 84 degrees and metres above the ellipsoid. geoid_m: separation there."""
-
-    latitude_deg: float = 40.0573
-    longitude_deg: float = -75.2183
-    height_m: float = 58.0
-    geoid_m: float = -33.6
+SITE = Datum(latitude_deg=40.0573, longitude_deg=-75.2183, height_m=58.0, geoid_separation_m=-33.6)
+"""Origin of the simulated world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +30,7 @@ class WorldConfig:
     shake: float = 1.0
     schedule: Schedule = field(default_factory=Schedule)
     antenna_m: tuple[float, float, float] = (-0.05, 0.0, 0.20)
-    datum: Datum = field(default_factory=Datum)
+    datum: Datum = SITE
     lidar: LidarConfig = field(default_factory=LidarConfig)
     imu: ImuConfig = field(default_factory=ImuConfig)
 

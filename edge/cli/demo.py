@@ -1,0 +1,127 @@
+"""`mapforest demo`: the whole mission on the emulated payload."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+from rich.live import Live
+from rich.progress import Progress
+from rich.table import Table
+
+from drivers.sim.payload import Payload
+from drivers.sim.scenarios import scenario
+from edge import demo
+from edge.cli import exit_codes
+from edge.cli.evaluate import clock_table
+from edge.control.client import ControlClient
+from edge.control.messages import Status, Verdict
+from edge.validation.clock_truth import ClockReport, clock_reports
+
+HELP = """the whole mission on the emulated payload: record a walk, validate it, compare with the truth
+
+example: mapforest demo --seed 3
+         mapforest demo --tui      (press the keys yourself: space starts, space twice stops, q leaves)
+
+Three emulated sensors speak their real protocols from one simulated forest; a recorder records them as on the
+payload. The outputs stay in the folder demo/."""
+_EXIT = {"PASS": exit_codes.GOOD, "WARN": exit_codes.WARNINGS, "FAIL": exit_codes.FAILED}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("--scenario", default="demo", help="which walk (`mapforest sim --list` names them)")
+    parser.add_argument("--seed", type=int, help="another forest and walk of the same kind")
+    parser.add_argument("--folder", type=Path, default=Path("demo"), help="where everything goes")
+    parser.add_argument("--tui", action="store_true", help="open the operator's screen instead of pressing the keys")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Exit code as the verdict: 0 PASS, 3 WARN, 1 FAIL."""
+    console = Console(stderr=args.json)
+    stage = demo.Stage(args.folder.absolute())
+    config = demo.payload_config(stage, scenario(args.scenario, args.seed))
+    demo.prepare(stage, config)
+    console.print("starting the emulated payload (the first time on a machine compiles it: about a minute) ...")
+    with demo.recorder(stage) as client, Payload(config) as payload:
+        if args.tui:
+            _operate(stage)
+            return exit_codes.GOOD
+        folder, verdict = _mission(client, payload, console)
+    reports = clock_reports(folder, stage.truth)
+    if args.json:
+        print(msgspec.json.encode({"session": str(folder), "verdict": verdict, "clocks": reports}).decode())
+    else:
+        _conclude(console, folder, verdict, reports)
+    return _EXIT[verdict.verdict]
+
+
+def _mission(client: ControlClient, payload: Payload, console: Console) -> tuple[Path, Verdict]:
+    with _Screen(console) as screen:
+        demo.wait_for_sensors(client, screen.show)
+        folder = demo.record_walk(client, payload, screen.show)
+        return folder, demo.wait_for_verdict(client, screen.show)
+
+
+def _operate(stage: demo.Stage) -> None:
+    # The screen is a floor above: named by a string, as in the table of commands.
+    importlib.import_module("ui.command").run(stage.socket)
+
+
+class _Screen:
+    """What the demonstration shows while it runs."""
+
+    def __init__(self, console: Console) -> None:
+        self._live = Live(console=console, refresh_per_second=2, transient=True)
+        self._progress = Progress(console=console)
+        self._walk = self._progress.add_task("walk", total=1.0)
+
+    def __enter__(self) -> _Screen:
+        self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._live.stop()
+
+    def show(self, status: Status, share: float) -> None:
+        """One state."""
+        self._progress.update(self._walk, completed=share)
+        grid = Table.grid()
+        grid.add_row(_sensors(status))
+        grid.add_row(self._progress)
+        self._live.update(grid)
+
+
+def _sensors(status: Status) -> Table:
+    recording = status.recording
+    title = (
+        f"{status.state}  {recording.elapsed_s:4.0f} s  {recording.bytes_written / 1e6:.0f} MB"
+        if recording
+        else status.state
+    )
+    table = Table(title=title, title_justify="left", box=None)
+    for column in ("sensor", "state", "rates", "lost", ""):
+        table.add_column(column)
+    for sensor in status.sensors:
+        rates = "  ".join(f"{s.name} {s.rate_hz:.1f}/{s.expected_hz:g} Hz" for s in sensor.streams)
+        table.add_row(sensor.name, sensor.state, rates, str(sum(s.lost for s in sensor.streams)), sensor.problem)
+    return table
+
+
+def _conclude(console: Console, folder: Path, verdict: Verdict, reports: list[ClockReport]) -> None:
+    console.print(clock_table(reports))
+    style = {"PASS": "bold green", "WARN": "bold yellow", "FAIL": "bold red"}[verdict.verdict]
+    console.print(f"[{style}]{verdict.verdict}[/]  {verdict.session}")
+    for reason in verdict.reasons:
+        console.print(f"  {reason}")
+    console.print(f"\nrecording   {folder}  (a rosbag2 folder; Foxglove opens its .mcap files)")
+    for path in sorted(folder.iterdir()):
+        console.print(
+            f"            {path.name}  {path.stat().st_size / 1e6:.1f} MB" if path.is_file() else "",
+            end="\n" if path.is_file() else "",
+        )
+    console.print(f"truth       {folder.parents[1] / 'truth'}  (poses, stems, clocks; no driver ever saw it)")
+    console.print(f"next        mapforest info {folder}")
