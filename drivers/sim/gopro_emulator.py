@@ -15,14 +15,13 @@ import time
 from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 from random import Random
-from threading import Event
 from typing import TextIO
 
 from drivers.errors import SimulationError
 from drivers.sim.faults import FaultPlan
 from drivers.sim.gopro_device import Hero8, Quirks
 from drivers.sim.gopro_line import BadLine, StreamClock
-from drivers.sim.sources import VideoSource
+from drivers.sim.sources import StopFlag, VideoSource
 from drivers.sim.transport_mux import PACKET, TransportMux
 
 logger = logging.getLogger(__name__)
@@ -43,7 +42,7 @@ def run(
     source: VideoSource,
     plan: FaultPlan,
     *,
-    stop: Event,
+    stop: StopFlag,
     epoch_ns: int,
     address: str = "127.0.1.30",
     http_port: int = 8080,

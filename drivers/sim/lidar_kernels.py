@@ -1,7 +1,5 @@
 """Point slots of the simulated Mid-360: where each laser looks, what it meets, what the sensor makes of it."""
 
-
-
 from __future__ import annotations
 
 import math

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Protocol, TextIO
+from typing import TextIO
 
 from drivers.errors import ProtocolError, SimulationError
 from drivers.livox.frames import LONGEST_BYTES, Command, Frame, decode
@@ -22,7 +22,7 @@ from drivers.sim.livox_device import DeviceOptions, LivoxDevice
 from drivers.sim.livox_oscillator import Oscillator
 from drivers.sim.livox_states import FIRST_PACKET_S
 from drivers.sim.livox_streams import IMU_NS, ImuStream, PointStream
-from drivers.sim.sources import ImuSource, LidarSource
+from drivers.sim.sources import ImuSource, LidarSource, StopFlag
 
 ADDRESS = "127.0.1.10"
 BROADCAST = "127.255.255.255"
@@ -34,13 +34,6 @@ PUSH_NS = 1_000_000_000
 EXTRA_PUSH_NS = 15_000_000
 """Every write is followed by a push of its own within 20 ms."""
 TRUTH_NS = 100_000_000
-
-
-class StopFlag(Protocol):
-    """Event of `threading` or `multiprocessing`."""
-
-    def is_set(self) -> bool:
-        """Whether to stop."""
 
 
 def run(

@@ -17,10 +17,9 @@ from typing import Any
 from drivers.errors import SimulationError
 from drivers.sim.camera import Camera
 from drivers.sim.faults import SENSORS, Fault, FaultPlan
-from drivers.sim.gnss import ReceiverModel
+from drivers.sim.gnss import Antenna, ReceiverModel
 from drivers.sim.gnss_errors import PRESETS
 from drivers.sim.scenarios import WorldConfig
-from drivers.sim.scene import Doubles
 from drivers.sim.truth import write_truth
 from drivers.sim.world import World, build
 
@@ -163,24 +162,10 @@ def _livox(config: PayloadConfig, world: World, shared: _Shared, start: Callable
     livox_emulator.run(lidar, imu, plan, start(), shared.stop, address=address, truth_path=truth)
 
 
-class _Antenna:
-    """The true motion of the antenna, as `drivers.sim.gnss.AntennaTruth`."""
-
-    def __init__(self, world: World) -> None:
-        self._world = world
-        self.canopy = world.canopy
-
-    def position(self, t_ns: int) -> Doubles:
-        return self._world.position(t_ns, ANTENNA_M)
-
-    def velocity(self, t_ns: int) -> Doubles:
-        return self._world.velocity(t_ns, ANTENNA_M)
-
-
 def _reach(config: PayloadConfig, world: World, shared: _Shared, start: Callable[[], int]) -> None:
     from drivers.sim import reach_emulator
 
-    source = ReceiverModel(_Antenna(world), PRESETS[config.gnss], config.world.datum)
+    source = ReceiverModel(Antenna(world, ANTENNA_M), PRESETS[config.gnss], config.world.datum)
     source.epoch(0)
     plan = FaultPlan("reach", config.faults)
     pty, tcp, truth = config.reach_pty, config.reach_address, _truth(config, "reach")
@@ -197,4 +182,6 @@ def _gopro(config: PayloadConfig, world: World, shared: _Shared, start: Callable
     renderer.render(0)  # compiles
     video = RenderedVideo(renderer, camera.width_px, camera.height_px)
     plan = FaultPlan("gopro", config.faults)
-    gopro_emulator.run(video, plan, start(), shared.stop, address=config.gopro_address, truth=_truth(config, "gopro"))
+    (address, port), truth = config.gopro_address, _truth(config, "gopro")
+    epoch_ns = start()
+    gopro_emulator.run(video, plan, stop=shared.stop, epoch_ns=epoch_ns, address=address, http_port=port, truth=truth)

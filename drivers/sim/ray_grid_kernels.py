@@ -1,7 +1,5 @@
 """Which solids stand over which cell of the terrain, and how high there."""
 
-
-
 from __future__ import annotations
 
 import math

@@ -6,8 +6,6 @@ ellipsoids centre x y z, horizontal, vertical semi-axis, extinction a metre, ref
 boxes      centre x y z, half edges x y z, cos yaw, sin yaw, reflectivity
 """
 
-
-
 from __future__ import annotations
 
 import math

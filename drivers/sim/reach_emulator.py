@@ -13,25 +13,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, TextIO
+from typing import TextIO
 
 from drivers.sim.faults import FaultPlan
 from drivers.sim.reach_emulator_faults import LineFaults
 from drivers.sim.reach_emulator_nmea import SentenceSet, sentences
 from drivers.sim.reach_emulator_ports import BITS_A_BYTE, Port, PseudoTerminal, TcpServer
-from drivers.sim.sources import GnssEpoch, GnssSource
+from drivers.sim.sources import GnssEpoch, GnssSource, StopFlag
 
 SLICE_BYTES = 64
 """Serial bytes reach the host in such pieces (the packet size of USB serial)."""
 TICK_S = 0.05
 """Longest nap: stop and the start of a fault are seen this soon."""
-
-
-class StopEvent(Protocol):
-    """`threading.Event` or `multiprocessing.Event`."""
-
-    def is_set(self) -> bool: ...
-    def wait(self, timeout: float | None = None) -> bool: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +50,7 @@ def run(
     source: GnssSource,
     plan: FaultPlan,
     epoch_ns: int,
-    stop: StopEvent,
+    stop: StopFlag,
     *,
     pty: Path | None = None,
     tcp: tuple[str, int] | None = None,
@@ -121,7 +114,7 @@ class Receiver:
         self._down_until_ns = 0
         self._lost_until_ns = 0
 
-    def run(self, stop: StopEvent, truth: Path | None = None) -> None:
+    def run(self, stop: StopFlag, truth: Path | None = None) -> None:
         """Until `stop` is set."""
         record = None if truth is None else truth.open("a", encoding="utf-8")
         next_utc_ns = self._next_utc_ns(time.monotonic_ns())
@@ -207,7 +200,7 @@ class Receiver:
             _, _, port, piece = heapq.heappop(self._queue)
             port.send(piece)
 
-    def _nap(self, stop: StopEvent, next_epoch_ns: int) -> None:
+    def _nap(self, stop: StopFlag, next_epoch_ns: int) -> None:
         due_ns = min(next_epoch_ns, self._queue[0][0] if self._queue else next_epoch_ns)
         left_s = (due_ns - time.monotonic_ns()) / 1e9
         if left_s > 0.0:

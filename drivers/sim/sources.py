@@ -78,3 +78,13 @@ class Sources:
     imu: ImuSource
     gnss: GnssSource
     video: VideoSource
+
+
+class StopFlag(Protocol):
+    """Event of `threading` or `multiprocessing` that ends an emulator."""
+
+    def is_set(self) -> bool:
+        """Whether to stop."""
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until it is set, `timeout` seconds at most; whether it is."""
