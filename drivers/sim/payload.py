@@ -50,7 +50,12 @@ class PayloadConfig:
         tables: dict[str, dict[str, Any]] = {
             "livox": {"driver": "livox", "address": self.livox_address, "host_address": "127.0.0.1"},
             "reach": {"driver": "reach", "endpoint": "tcp:{}:{}".format(*self.reach_address)},
-            "gopro": {"driver": "gopro", "address": self.gopro_address[0], "http_port": self.gopro_address[1]},
+            "gopro": {
+                "driver": "gopro",
+                "address": self.gopro_address[0],
+                "http_port": self.gopro_address[1],
+                "host": "127.0.0.1",
+            },
         }
         return {name: tables[name] for name in self.sensors}
 

@@ -71,6 +71,7 @@ def _sensor(health: SensorHealth) -> DiagnosticStatus:
 
 def _clock(clock: ClockState) -> Values:
     return [
+        ("clock.updated_ns", str(clock.updated_ns)),
         ("clock.offset_ns", str(clock.offset_ns)),
         ("clock.skew_ppm", f"{clock.skew_ppm:.3f}"),
         ("clock.sigma_ns", f"{clock.sigma_ns:.0f}"),
