@@ -33,40 +33,6 @@ class AntennaTruth(Protocol):
         """0 open sky .. 1 closed."""
 
 
-class CarrierTruth(Protocol):
-    """What is true of the carrier: `drivers.sim.world.World` is one."""
-
-    def position(self, t_ns: int, lever_m: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """(3,) metres, of a point fixed at `lever_m` in `base_link`."""
-
-    def velocity(self, t_ns: int, lever_m: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """(3,) m/s, of the same point."""
-
-    def canopy(self, t_ns: int) -> float:
-        """0 open sky .. 1 closed."""
-
-
-@dataclass(frozen=True)
-class Antenna:
-    """The antenna at its lever arm on a carrier: an `AntennaTruth`."""
-
-    carrier: CarrierTruth
-    lever_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """In `base_link`."""
-
-    def position(self, t_ns: int) -> npt.NDArray[np.float64]:
-        """(3,) metres, ENU."""
-        return self.carrier.position(t_ns, self.lever_m)
-
-    def velocity(self, t_ns: int) -> npt.NDArray[np.float64]:
-        """(3,) m/s, ENU."""
-        return self.carrier.velocity(t_ns, self.lever_m)
-
-    def canopy(self, t_ns: int) -> float:
-        """0 open sky .. 1 closed."""
-        return self.carrier.canopy(t_ns)
-
-
 @dataclass(frozen=True, slots=True)
 class _State:
     """The receiver at one grid time."""

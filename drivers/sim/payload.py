@@ -17,14 +17,12 @@ from typing import Any
 from drivers.errors import SimulationError
 from drivers.sim.camera import Camera
 from drivers.sim.faults import SENSORS, Fault, FaultPlan
-from drivers.sim.gnss import Antenna, ReceiverModel
+from drivers.sim.gnss import ReceiverModel
 from drivers.sim.gnss_errors import PRESETS
 from drivers.sim.scenarios import WorldConfig
 from drivers.sim.truth import write_truth
 from drivers.sim.world import World, build
 
-ANTENNA_M = (-0.05, 0.0, 0.20)
-"""Lever arm of the antenna in `base_link`, as in the nominal geometry."""
 READY_S = 180.0
 """The first start on a machine compiles the ray caster and the rasteriser: half a minute on one slow core."""
 LEAD_NS = 200_000_000
@@ -170,7 +168,7 @@ def _livox(config: PayloadConfig, world: World, shared: _Shared, start: Callable
 def _reach(config: PayloadConfig, world: World, shared: _Shared, start: Callable[[], int]) -> None:
     from drivers.sim import reach_emulator
 
-    source = ReceiverModel(Antenna(world, ANTENNA_M), PRESETS[config.gnss], config.world.datum)
+    source = ReceiverModel(world.antenna, PRESETS[config.gnss], config.world.datum)
     source.epoch(0)
     plan = FaultPlan("reach", config.faults)
     pty, tcp, truth = config.reach_pty, config.reach_address, _truth(config, "reach")

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from drivers.sim.gnss import Antenna, ReceiverModel
+from drivers.sim.gnss import ReceiverModel
 from drivers.sim.gnss_errors import CLEAN, CORRUPTED, DISHONEST, HONEST, GnssErrorModel
 from drivers.sim.gnss_geodesy import Datum, ecef, geodetic
 
@@ -145,17 +145,3 @@ def test_dropouts_last_15_to_30_s():
     assert runs_s.max() <= 30.2
     no_fix = next(epoch for epoch in sampled(source, 900) if epoch.quality == 0)
     assert math.isnan(no_fix.latitude_deg)
-
-
-def test_the_antenna_rides_on_its_lever_arm():
-    class Carrier(Straight):
-        def position(self, t_ns, lever_m):
-            return super().position(t_ns) + np.asarray(lever_m)
-
-        def velocity(self, t_ns, lever_m):
-            return super().velocity(t_ns)
-
-    source = ReceiverModel(Antenna(Carrier(0.0), (0.0, 0.0, 2.0)), CLEAN)
-    epoch = source.epoch(10 * SECOND)
-    enu = source.datum.enu(epoch.latitude_deg, epoch.longitude_deg, epoch.height_m)
-    assert enu == pytest.approx((8.0, 9.0, 2.1), abs=0.1)
