@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 WRAP = 1 << 16
 LATE = 1024
 """A counter this little behind the newest is a late packet; further off it is a restart or a long loss."""
 JUMP_NS = 1_000_000_000
+SOON_NS = 400_000_000
+"""The next packet within this time needs no closer look."""
 
 
 class Verdict(Enum):
@@ -25,8 +27,7 @@ class Verdict(Enum):
     """First packet on a new line of time or count."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Arrival:
+class _Arrival(NamedTuple):
     count: int
     sensor_ns: int
     receive_ns: int
@@ -55,6 +56,8 @@ class PacketCounter:
         if last is None:
             return self._accept(arrival)
         gap = (count - last.count) % WRAP
+        if gap == 1 and 0 < sensor_ns - last.sensor_ns < SOON_NS:
+            return self._accept(arrival)
         if gap == 0 and sensor_ns == last.sensor_ns:
             self.duplicates += 1
             return Verdict.DUPLICATE
@@ -101,7 +104,8 @@ class PacketCounter:
     def _accept(self, arrival: _Arrival) -> Verdict:
         self._last = arrival
         self._odd = None
-        self._missing.pop(arrival.count, None)  # of the previous round of the counter
+        if self._missing:
+            self._missing.pop(arrival.count, None)  # of the previous round of the counter
         self.received += 1
         return Verdict.NEW
 

@@ -21,16 +21,17 @@ class RateMeter:
         """Reception of the newest message."""
         return self._last_ns
 
-    def mark(self, receive_ns: int) -> None:
-        """One message came."""
+    def mark(self, *receive_ns: int) -> None:
+        """Messages came, at these times in order."""
         with self._lock:
-            if self._last_ns is None:
-                self._previous_ns = receive_ns
-            else:
-                self._gap_ns = max(self._gap_ns, receive_ns - self._last_ns)
-                self._since += 1
-            self._last_ns = receive_ns
-            self.total += 1
+            for at_ns in receive_ns:
+                if self._last_ns is None:
+                    self._previous_ns = at_ns
+                else:
+                    self._gap_ns = max(self._gap_ns, at_ns - self._last_ns)
+                    self._since += 1
+                self._last_ns = at_ns
+            self.total += len(receive_ns)
 
     def read(self, now_ns: int) -> tuple[float, float]:
         """Rate (Hz) over the messages, and longest silence (s), since the last call; a lasting silence counts."""

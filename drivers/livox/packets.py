@@ -79,10 +79,13 @@ def headers(slots: npt.NDArray[np.uint8]) -> npt.NDArray[Any]:
     return np.ndarray((len(slots),), HEADER, slots.data, strides=(slots.strides[0],))
 
 
-def records(slots: npt.NDArray[np.uint8], data_type: int, count: int) -> npt.NDArray[Any]:
-    """View (n, count) of the records of datagrams of one type and count that lie one a row in `slots`."""
+def records(
+    slots: npt.NDArray[np.uint8], rows: npt.NDArray[np.intp], data_type: int, count: int
+) -> npt.NDArray[Any]:
+    """Copy (len(rows), count) of the records of datagrams of one type and count that lie one a row in `slots`."""
     dtype = RECORDS[data_type]
-    return np.ndarray((len(slots), count), dtype, slots.data, HEADER.itemsize, (slots.strides[0], dtype.itemsize))
+    end = HEADER.itemsize + count * dtype.itemsize
+    return slots[:, HEADER.itemsize : end].take(rows, axis=0).view(dtype)
 
 
 def well_formed(head: npt.NDArray[Any], lengths: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
@@ -115,7 +118,7 @@ def decode(datagram: Buffer) -> Packet:
         int(first["udp_cnt"]),
         int(first["timestamp"]),
         int(first["time_interval"]),
-        records(slots, int(first["data_type"]), int(first["dot_num"]))[0],
+        records(slots, np.zeros(1, np.intp), int(first["data_type"]), int(first["dot_num"]))[0],
     )
 
 
@@ -134,4 +137,5 @@ def returned(points: npt.NDArray[Any], data_type: int) -> npt.NDArray[np.bool_]:
     """Which records are returns; the others keep their place so that the index gives the time."""
     if data_type == DataType.SPHERICAL:
         return np.asarray(points["depth"] != 0)
-    return np.asarray((points["xyz"] != 0).any(axis=-1))
+    xyz = points["xyz"]
+    return np.asarray((xyz[..., 0] | xyz[..., 1] | xyz[..., 2]) != 0)

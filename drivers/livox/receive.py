@@ -1,7 +1,7 @@
 """The receiving thread: takes datagrams off the sockets into preallocated blocks, stamps them, and does nothing else.
 
-The kernel stamps each datagram on arrival (SO_TIMESTAMPNS), so the thread may sleep a few milliseconds and take
-bursts: it wakes 200 times a second instead of 2,283, and a busy interpreter does not blur the stamps. Each stamp is
+The kernel stamps each datagram on arrival (SO_TIMESTAMPNS), so the thread may sleep for 20 ms and take
+bursts: it wakes 50 times a second instead of 2,283, and a busy interpreter does not blur the stamps. Each stamp is
 moved to CLOCK_MONOTONIC and kept between the last moment the socket was empty and now, so that a step of the
 host's clock cannot move it further than that.
 """
@@ -27,7 +27,7 @@ SLOT_BYTES = 1408
 BLOCK_SLOTS = 128
 BLOCKS = 48
 """2.7 s of packets at the full rate wait here for the decoder, before the kernel's buffer fills as well."""
-PAUSE_S = 0.005
+PAUSE_S = 0.02
 POLL_S = 0.1
 BURST = 1024
 """Datagrams taken off one socket before the others have their turn."""
@@ -74,7 +74,7 @@ class Receiver:
         self._sources: list[Source] = []
         self._free: deque[Block] = deque(Block() for _ in range(BLOCKS))
         self._filled: deque[Block] = deque()
-        self._block = self._free.popleft()
+        self._block = self._free.pop()
         self._arrived = Event()
         self._address = ""
         self.foreign = 0
@@ -173,7 +173,7 @@ class Receiver:
         full = len(self._block) == BLOCK_SLOTS
         if len(self._block) and (full or not self._filled) and self._free:
             self._filled.append(self._block)
-            self._block = self._free.popleft()
+            self._block = self._free.pop()
             self._arrived.set()
             return True
         return not full

@@ -32,8 +32,8 @@ class PointPackets:
     receive_ns: npt.NDArray[np.int64]
     records: npt.NDArray[Any]
 
-    def where(self, chosen: npt.NDArray[Any]) -> PointPackets:
-        """The packets of a mask or in the order of an index."""
+    def where(self, chosen: npt.NDArray[Any] | slice) -> PointPackets:
+        """The packets of a mask, in the order of an index, or of a slice (without copying)."""
         return PointPackets(
             self.data_type,
             self.sensor_ns[chosen],
@@ -76,12 +76,12 @@ class ScanAssembler:
         start_ns = self._start_ns
         if start_ns is None:
             start_ns = self._open(int(packets.sensor_ns.min()))
-        late = packets.last_point_ns() < start_ns
-        if late.any():
-            self.too_late += int(late.sum())
-            packets = packets.where(~late)
+        last_ns = packets.last_point_ns()
+        if last_ns.min() < start_ns:
+            self.too_late += int((last_ns < start_ns).sum())
+            packets = packets.where(last_ns >= start_ns)
         self._pending.append(packets)
-        newest_ns = int(packets.last_point_ns().max(initial=0))
+        newest_ns = int(last_ns.max())
         while self._start_ns is not None and newest_ns >= self._start_ns + PERIOD_NS + SLACK_NS:
             self._close()
 
@@ -100,9 +100,13 @@ class ScanAssembler:
         """End the window: its points go out, later ones wait, and the next window with packets opens."""
         assert self._start_ns is not None
         end_ns = self._start_ns + PERIOD_NS
-        inside = [packets.where(packets.sensor_ns < end_ns) for packets in self._pending]
+        inside, waiting = [], []
+        for packets in _grouped(self._pending):
+            begun = int(np.searchsorted(packets.sensor_ns, end_ns))
+            over = int(np.searchsorted(packets.last_point_ns(), end_ns))
+            inside.append(packets.where(slice(0, begun)))
+            waiting.append(packets.where(slice(over, None)))
         inside = [packets for packets in inside if len(packets.sensor_ns)]
-        waiting = [packets.where(packets.last_point_ns() >= end_ns) for packets in self._pending]
         self._pending = [packets for packets in waiting if len(packets.sensor_ns)]
         if inside:
             self._send(inside, self._start_ns, end_ns)
@@ -111,7 +115,7 @@ class ScanAssembler:
         self._open(end_ns + skipped * PERIOD_NS)
 
     def _send(self, packets: list[PointPackets], start_ns: int, end_ns: int) -> None:
-        columns = [_points_of(group, start_ns, end_ns) for group in _grouped(packets)]
+        columns = [_points_of(group, start_ns, end_ns) for group in packets]
         offset_ns, xyz, reflectivity, tag, line = (np.concatenate(column) for column in zip(*columns, strict=True))
         if len(columns) > 1:  # the point type was changed within the window
             order = np.argsort(offset_ns, kind="stable")

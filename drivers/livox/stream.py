@@ -14,7 +14,6 @@ from drivers.driver import Emit
 from drivers.livox.counter import PacketCounter, Verdict
 from drivers.livox.meter import RateMeter
 from drivers.livox.packets import (
-    CRC_OFFSET,
     HEADER,
     INTERVAL_UNIT_NS,
     PACKET_NS,
@@ -78,7 +77,9 @@ class StreamDecoder:
         sound = well_formed(head, lengths)
         receive_ns = np.array(block.receive_ns, np.int64)
         order = np.argsort(receive_ns, kind="stable")
-        rows = [row for row in order[sound[order]].tolist() if self._checks(block, row)]
+        for row in np.flatnonzero(sound & (head["crc32"] != 0)).tolist():
+            sound[row] = checksum_holds(block.rows[row], block.lengths[row], int(head["crc32"][row]))
+        rows = order[sound[order]].tolist()
         self.malformed += count - len(rows)
         for run in self._runs(block, head, rows):
             self._collect(slots, head, receive_ns, run)
@@ -87,10 +88,6 @@ class StreamDecoder:
     def flush(self) -> None:
         """Send out the unfinished scan: the stream fell silent, or the driver stops."""
         self._assembler.flush()
-
-    def _checks(self, block: Block, row: int) -> bool:
-        expected = int.from_bytes(block.rows[row][CRC_OFFSET : CRC_OFFSET + 4], "little")
-        return checksum_holds(block.rows[row], block.lengths[row], expected)
 
     def _runs(self, block: Block, head: npt.NDArray[Any], rows: list[int]) -> Iterator[list[int]]:
         """Rows of the point packets to keep, cut where the sensor's clock jumped; IMU samples go out on the way."""
@@ -115,7 +112,6 @@ class StreamDecoder:
             if inertial:
                 self._emit_imu(block.rows[row], sensor_ns, arrival_ns)
             else:
-                self.point_meter.mark(arrival_ns)
                 run.append(row)
         yield run
 
@@ -123,9 +119,12 @@ class StreamDecoder:
         self, slots: npt.NDArray[np.uint8], head: npt.NDArray[Any], receive_ns: npt.NDArray[np.int64], run: list[int]
     ) -> None:
         """Hand point packets to the assembler, one group a type and length (nearly always one)."""
+        if not run:
+            return
         chosen = np.array(run, np.intp)
+        self.point_meter.mark(*receive_ns[chosen].tolist())
         kinds = head["data_type"][chosen].astype(np.int64) << 16 | head["dot_num"][chosen]
-        for kind in np.unique(kinds).tolist():
+        for kind in set(kinds.tolist()):
             rows = chosen[kinds == kind]
             data_type, dots = kind >> 16, kind & 0xFFFF
             self._assembler.add(
@@ -134,7 +133,7 @@ class StreamDecoder:
                     head["timestamp"][rows].astype(np.int64),
                     head["time_interval"][rows].astype(np.int64),
                     receive_ns[rows],
-                    records(slots, data_type, dots)[rows],
+                    records(slots, rows, data_type, dots),
                 )
             )
 
