@@ -28,7 +28,7 @@ class Verdict(Enum):
 
 
 class _Arrival(NamedTuple):
-    count: int
+    number: int
     sensor_ns: int
     receive_ns: int
 
@@ -55,7 +55,7 @@ class PacketCounter:
         last = self._last
         if last is None:
             return self._accept(arrival)
-        gap = (count - last.count) % WRAP
+        gap = (count - last.number) % WRAP
         if gap == 1 and 0 < sensor_ns - last.sensor_ns < SOON_NS:
             return self._accept(arrival)
         if gap == 0 and sensor_ns == last.sensor_ns:
@@ -67,12 +67,12 @@ class PacketCounter:
         if packets is None:
             return self._judge_odd(arrival)
         if packets > 1:
-            self._lose(last.count, packets - 1)
+            self._lose(last.number, packets - 1)
         return self._accept(arrival)
 
     def _packets_between(self, earlier: _Arrival, later: _Arrival) -> int | None:
         """Packets sent from one arrival to a later one; None when count and time contradict each other."""
-        gap = (later.count - earlier.count) % WRAP
+        gap = (later.number - earlier.number) % WRAP
         elapsed_ns = later.sensor_ns - earlier.sensor_ns
         ahead_ns = elapsed_ns - (later.receive_ns - earlier.receive_ns)
         if elapsed_ns <= 0 or ahead_ns > JUMP_NS:
@@ -84,7 +84,7 @@ class PacketCounter:
 
     def _fits(self, packets: int, elapsed_ns: int) -> bool:
         """Whether so many packets take this long; oscillator and IMU jitter stay far within the tolerance."""
-        return abs(packets - elapsed_ns / self._period_ns) <= 64 + packets // 50
+        return abs(packets - elapsed_ns / self._period_ns) <= 64 + packets // 1000
 
     def _judge_odd(self, arrival: _Arrival) -> Verdict:
         odd, last = self._odd, self._last
@@ -93,7 +93,7 @@ class PacketCounter:
             self.odd += 1
             return Verdict.ODD
         self.odd -= 1  # the first packet of the new line was sound after all
-        if (odd.count - last.count) % WRAP <= LATE:
+        if (odd.number - last.number) % WRAP <= LATE:
             self.jumps += 1
         else:
             self.restarts += 1
@@ -105,7 +105,7 @@ class PacketCounter:
         self._last = arrival
         self._odd = None
         if self._missing:
-            self._missing.pop(arrival.count, None)  # of the previous round of the counter
+            self._missing.pop(arrival.number, None)  # of the previous round of the counter
         self.received += 1
         return Verdict.NEW
 

@@ -79,9 +79,7 @@ def headers(slots: npt.NDArray[np.uint8]) -> npt.NDArray[Any]:
     return np.ndarray((len(slots),), HEADER, slots.data, strides=(slots.strides[0],))
 
 
-def records(
-    slots: npt.NDArray[np.uint8], rows: npt.NDArray[np.intp], data_type: int, count: int
-) -> npt.NDArray[Any]:
+def records(slots: npt.NDArray[np.uint8], rows: npt.NDArray[np.intp], data_type: int, count: int) -> npt.NDArray[Any]:
     """Copy (len(rows), count) of the records of datagrams of one type and count that lie one a row in `slots`."""
     dtype = RECORDS[data_type]
     end = HEADER.itemsize + count * dtype.itemsize

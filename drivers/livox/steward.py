@@ -40,6 +40,8 @@ POINT_TYPES = {
     "spherical": DataType.SPHERICAL,
 }
 STOP_STATES = {"idle": WorkState.IDLE, "ready": WorkState.READY}
+STARTING_STATES = (None, WorkState.SELFCHECK, WorkState.MOTOR_STARTUP, WorkState.UPGRADE)
+"""States that end by themselves."""
 PUSH_OVERDUE_S = 3.0
 """The status comes once a second; when it does not, it is asked for."""
 STOP_TIMEOUT_S = 0.5
@@ -61,6 +63,7 @@ class Steward:
         self._note = note
         self._configure_again = Event()
         self._connected = False
+        self._repeated = False
         self._status_ns = 0
         self._configured_ns = 0
         self.state = SensorState.SEARCHING
@@ -182,10 +185,13 @@ class Steward:
             self._mind_silence(link)
 
     def _mind_silence(self, link: ControlLink) -> None:
-        last_ns = max(self._configured_ns, self._last_data_ns() or 0)
-        sampling = self.status is not None and self.status.work_state == WorkState.SAMPLING
-        if _age_s(last_ns) > (self._config.silence_s if sampling else self._config.start_timeout_s):
-            self._note(Severity.WARNING, "the LiDAR answers but sends no data; configuring it again")
+        data_ns = self._last_data_ns() or 0
+        starting = self.status is None or self.status.work_state in STARTING_STATES
+        patience_s = self._config.start_timeout_s if starting else self._config.silence_s
+        if _age_s(max(self._configured_ns, data_ns)) > patience_s:
+            if data_ns > self._configured_ns or not self._repeated:
+                self._note(Severity.WARNING, "the LiDAR answers but sends no points; configuring it again")
+            self._repeated = data_ns <= self._configured_ns
             self._configure(link)
 
     def _heard(self, status: Status) -> None:

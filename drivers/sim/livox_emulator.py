@@ -27,8 +27,8 @@ from drivers.sim.sources import ImuSource, LidarSource, StopFlag
 ADDRESS = "127.0.1.10"
 BROADCAST = "127.255.255.255"
 DISCOVERY_PORT, STATUS_PORT, POINT_PORT, IMU_PORT = 56000, 56200, 56300, 56400
-PACE_NS = 10 * PACKET_NS
-"""Packets leave in bursts of ten; the last of each burst leaves when it is complete."""
+PACE_NS = 5 * PACKET_NS
+"""Packets leave in bursts of five; the last of each burst leaves when it is complete."""
 PACE_DELAYED_NS = 1_000_000
 PUSH_NS = 1_000_000_000
 EXTRA_PUSH_NS = 15_000_000

@@ -18,6 +18,7 @@ BLOCK_PACKETS = 20
 """Cast at a time: 9.6 ms."""
 BLOCKS_AHEAD = 4
 LAST_POINT_NS = 475_000
+TIMESTAMP = slice(28, 36)
 HOPELESS_NS = 1_000_000_000
 """Behind real time by this much, packets are skipped, and show as lost."""
 IMU_NS = 5_000_000
@@ -73,6 +74,8 @@ class PointStream:
             if end_ticks > ticks_ns:
                 return
             self._ready.popleft()
+            stamp_ns = self._oscillator.stamp_ns(end_ticks - LAST_POINT_NS)
+            packet[TIMESTAMP] = stamp_ns.to_bytes(8, "little")  # now: a clock step meets points and IMU together
             yield packet
 
     def _cast_ahead(self) -> None:
@@ -88,8 +91,7 @@ class PointStream:
             return False
         job = self._jobs.popleft()
         ticks = [self._ticks_of(job.first + index) for index in range(BLOCK_PACKETS)]
-        stamps_ns = np.array([self._oscillator.stamp_ns(tick) for tick in ticks], np.int64)
-        packets = point_packets(job.future.result(), data_type, stamps_ns, self.count)
+        packets = point_packets(job.future.result(), data_type, np.array(ticks), self.count)
         self.count += BLOCK_PACKETS
         self._ready.extend((tick + LAST_POINT_NS, memoryview(row)) for tick, row in zip(ticks, packets, strict=True))
         return True

@@ -1,5 +1,7 @@
 """The driver against the emulated LiDAR, end to end over UDP on loopback."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,85 @@ def test_nobody_there():
             wait_for(lambda: "does not answer" in rig.health().problem, 5.0)
             assert rig.health().state is SensorState.SEARCHING
             assert "check its power" in rig.health().advice
+
+
+def test_reboot_is_noticed_and_survived():
+    with running("livox:reboot@1.0") as rig:
+        wait_for(lambda: "the LiDAR started anew" in rig.events, 10.0)
+        streaming(rig, 4)
+        health = rig.health()
+        points = rig.emulator.points.tally
+    assert health.clock is not None
+    assert health.clock.steps == 1
+    assert points.lost == 0
+    assert health.streams[0].lost == 0
+    stamps = [scan.stamp_ns for scan in rig.scans]
+    assert stamps == sorted(stamps)
+
+
+@pytest.mark.parametrize("step_s", [2.5, -3.0])
+def test_clock_step_is_an_event_and_no_loss(step_s):
+    with running(f"livox:clock_step={step_s}@1.0") as rig:
+        wait_for(lambda: any("jumped" in text for text in rig.events), 10.0)
+        streaming(rig, 5)
+        health = rig.health()
+    (event,) = [text for text in rig.events if "jumped" in text]
+    assert float(event.split()[-2]) == pytest.approx(step_s, abs=0.02)
+    assert [stream.lost for stream in health.streams] == [0, 0]
+    for scan in rig.scans:
+        assert 0 < scan.receive_ns - scan.stamp_ns < 0.2e9  # stamps stay those of the host
+    for sample in rig.samples:
+        assert abs(sample.receive_ns - sample.stamp_ns) < 0.05e9
+
+
+def test_stall_is_seen_and_the_stream_picked_up_again():
+    with running("livox:stall@1.0+2.5") as rig:
+        wait_for(lambda: rig.scans, 10.0)
+        wait_for(lambda: rig.health().state is not SensorState.OK, 10.0)
+        wait_for(lambda: rig.health().state is SensorState.SEARCHING, 10.0)
+        streaming(rig, 5)
+        wait_for(lambda: rig.health().state is SensorState.OK, 5.0)
+        assert [stream.lost for stream in rig.health().streams] == [0, 0]
+
+
+def test_pulled_cable_loses_what_was_sent_meanwhile_and_no_more():
+    with running("livox:disconnect@1.0+2.5") as rig:
+        wait_for(lambda: rig.health().state is SensorState.SEARCHING and rig.scans, 10.0)
+        wait_for(lambda: rig.emulator.points.tally.lost > 5000, 10.0)
+        streaming(rig, 5)
+        streams = rig.health().streams
+        points, imu = rig.emulator.points.tally, rig.emulator.imu.tally
+    assert (streams[0].lost, streams[1].lost) == (points.lost, imu.lost)
+    assert any("lost the LiDAR" in text for text in rig.events)
+
+
+def test_garbage_on_every_port_does_no_harm():
+    with running("livox:garbage=400") as rig:
+        streaming(rig, 8)
+        health = rig.health()
+    assert int(health.details["malformed packets"]) > 50
+    assert [stream.lost for stream in health.streams] == [0, 0]
+    assert health.state is SensorState.OK, health
+
+
+def test_damaged_packets_are_dropped_or_counted_and_time_stays_sane():
+    with running("livox:corrupt=0.05") as rig:
+        streaming(rig, 10)
+    stamps = np.diff([scan.stamp_ns for scan in rig.scans[1:-1]])
+    assert np.abs(stamps - 100_000_000).max() < 1_000_000
+
+
+def test_point_types_agree():
+    for name, exact in (("cartesian_16", 0.0051), ("spherical", 0.003)):
+        with running(settings={"point_type": name}) as rig:
+            streaming(rig, 4)
+        points = rig.scans[2].xyz_m
+        np.testing.assert_allclose(points[:, 1:], np.broadcast_to((2.0, -0.3), (len(points), 2)), atol=exact * 3)
+
+
+def test_lidar_sent_to_sleep_by_somebody_is_woken():
+    with emulated() as (emulator, lidar, host), driving(emulator, quick(lidar, host)) as rig:
+        streaming(rig, 2)
+        emulator.device.machine.aim(WorkState.IDLE, time.monotonic_ns())
+        wait_for(lambda: any("configuring it again" in text for text in rig.events), 10.0)
+        streaming(rig, 2)
