@@ -1,0 +1,1 @@
+"""The parts of the screen, one a file, each with its own CSS."""

@@ -1,0 +1,37 @@
+"""The verdict on the last session, while nothing is being recorded."""
+
+from __future__ import annotations
+
+from textual.app import ComposeResult
+from textual.containers import Vertical
+
+from ui.situation import Situation
+from ui.verdict import verdict_lines
+from ui.widgets.line import Line
+
+REASONS = 3
+"""As many as leave the sensors visible on 24 rows."""
+
+
+class VerdictPanel(Vertical):
+    """Hidden during a recording: the last one is no longer what matters."""
+
+    DEFAULT_CSS = """
+    VerdictPanel { height: auto; margin: 1 1 0 1; display: none; }
+    """
+
+    def compose(self) -> ComposeResult:
+        for _ in range(REASONS + 2):
+            yield Line()
+
+    def show(self, situation: Situation) -> None:
+        status = situation.status
+        verdict = status.verdict if status and status.state == "idle" else None
+        self.display = verdict is not None
+        if verdict is None:
+            return
+        lines = verdict_lines(verdict, REASONS)
+        for index, line in enumerate(self.query(Line)):
+            line.display = index < len(lines)
+            if line.display:
+                line.show(lines[index], situation.stale)
