@@ -29,8 +29,6 @@ from ui.tone import Tone
 from ui.verdict import verdict_page
 from ui.widgets.banner import Banner
 from ui.widgets.dashboard import Dashboard
-from ui.widgets.notice import Notice
-from ui.widgets.table import SensorTable
 
 DRAW_S = 0.5
 """Twice a second is as fast as numbers are read, and leaves room on a slow link."""
@@ -76,15 +74,17 @@ class RecorderApp(App[str]):
         self._bell, self._sun = options.bell, options.sun
         self._connection = connection
         self._clock = clock
+        self._dashboard = Dashboard()
         self._guard = StopGuard()
         self._history = History()
         self._requests = Requests()
         self._situation = Situation()
         self._status_s = self._notice_s = float("-inf")
         self._known_faults: frozenset[str] = frozenset()
+        self._ready_to_draw = False
 
     def compose(self) -> ComposeResult:
-        yield Dashboard()
+        yield self._dashboard
 
     def get_theme_variable_defaults(self) -> dict[str, str]:
         return SHADE.variables
@@ -93,8 +93,11 @@ class RecorderApp(App[str]):
         for theme in (SHADE, SUN):
             self.register_theme(theme)
         self.theme = (SUN if self._sun else SHADE).name
+
+    def on_dashboard_ready(self, _: Dashboard.Ready) -> None:
+        self._ready_to_draw = True
+        self.draw()
         self.set_interval(DRAW_S, self.draw)
-        self.call_after_refresh(self.draw)
         self.run_worker(self._connection.run(self.post_message), exit_on_error=False)
 
     def on_connected(self, _: Connected) -> None:
@@ -129,6 +132,8 @@ class RecorderApp(App[str]):
 
     def draw(self) -> None:
         """Bring the screen up to date."""
+        if not self._ready_to_draw:
+            return
         now_s = self._clock()
         age_s = now_s - self._status_s if self._situation.status else 0.0
         self._situation = replace(self._situation, status_age_s=age_s, armed_s=self._guard.armed_for_s(now_s))
@@ -142,7 +147,7 @@ class RecorderApp(App[str]):
     def say(self, text: str, tone: Tone = Tone.QUIET) -> None:
         """Answer the operator in the line above the keys."""
         self._notice_s = self._clock()
-        self._dashboard.query_one(Notice).say(text, tone)
+        self._dashboard.notice.say(text, tone)
 
     def ask(self, request: Request) -> None:
         """Send a request; the answer becomes a notice."""
@@ -182,7 +187,7 @@ class RecorderApp(App[str]):
         self.draw()
 
     def action_scroll(self, lines: int) -> None:
-        self._dashboard.query_one(SensorTable).scroll_relative(y=lines, animate=False)
+        self._dashboard.table.scroll_relative(y=lines, animate=False)
 
     def action_disarm(self) -> None:
         self._guard.disarm()
@@ -234,10 +239,6 @@ class RecorderApp(App[str]):
         yield SystemCommand("Bell", "Ring on a new fault, or not", self.action_toggle_bell)
         yield SystemCommand("Help", "Keys, symbols and words", self.action_help)
         yield SystemCommand("Quit", "Leave this screen; a recording goes on", self.action_quit)
-
-    @property
-    def _dashboard(self) -> Dashboard:
-        return self.screen_stack[0].query_one(Dashboard)
 
     def _can_mark(self) -> bool:
         recording = self._situation.state == "recording"

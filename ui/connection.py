@@ -8,17 +8,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-import msgspec
 from textual.message import Message
 
-from edge.control.messages import PROTOCOL_VERSION, Line, Reply, Request, Status
+from edge.control.codec import LINE_LIMIT, decode, encode
+from edge.control.messages import PROTOCOL_VERSION, Reply, Request, Status
+from edge.errors import ControlError
 from ui.messages import Connected, ConnectionLost, Replied, StatusArrived
 
 FIRST_WAIT_S = 0.25
 LONGEST_WAIT_S = 2.0
 """The recorder restarts within seconds; an operator should not wait longer than that for the screen."""
-LONGEST_LINE = 1 << 20
-"""A status is about 3 kB. Whatever is this long is not the recorder."""
 
 Post = Callable[[Message], object]
 
@@ -39,19 +38,16 @@ class SocketConnection:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._writer: asyncio.StreamWriter | None = None
-        self._encode = msgspec.json.Encoder().encode
-        self._decode = msgspec.json.Decoder(Line).decode
 
     async def run(self, post: Post) -> None:
         wait_s = FIRST_WAIT_S
         while True:
             try:
-                reader, self._writer = await asyncio.open_unix_connection(self._path, limit=LONGEST_LINE)
+                reader, self._writer = await asyncio.open_unix_connection(self._path, limit=LINE_LIMIT)
                 wait_s = FIRST_WAIT_S
                 await self._talk(reader, post)
                 post(ConnectionLost("The recorder closed the connection."))
-            except (OSError, ValueError) as error:
-                # msgspec's errors and asyncio's line-too-long are ValueErrors: not our protocol, so start over.
+            except (OSError, ControlError, ValueError) as error:  # ValueError: asyncio's line too long
                 post(ConnectionLost(self._explain(error)))
             finally:
                 await self._close()
@@ -61,7 +57,7 @@ class SocketConnection:
     def send(self, request: Request) -> bool:
         if self._writer is None or self._writer.is_closing():
             return False
-        self._writer.write(self._encode(request) + b"\n")
+        self._writer.write(encode(request))
         return True
 
     async def _talk(self, reader: asyncio.StreamReader, post: Post) -> None:
@@ -69,7 +65,7 @@ class SocketConnection:
         self.send(Request("subscribe"))
         post(Connected())
         while line := await reader.readline():
-            match self._decode(line):
+            match decode(line):
                 case Status() as status:
                     self._check(status.version)
                     post(StatusArrived(status))
@@ -79,7 +75,7 @@ class SocketConnection:
 
     def _check(self, version: int) -> None:
         if version != PROTOCOL_VERSION:
-            raise ValueError(f"The recorder speaks protocol {version}, this screen {PROTOCOL_VERSION}: update both.")
+            raise ControlError(f"The recorder speaks protocol {version}, this screen {PROTOCOL_VERSION}: update both.")
 
     def _explain(self, error: Exception) -> str:
         match error:
@@ -89,8 +85,6 @@ class SocketConnection:
                 return f"Not allowed to open {self._path}: join the group that owns it and log in again."
             case ConnectionRefusedError():
                 return f"Nobody answers at {self._path}: the recorder has stopped."
-            case msgspec.MsgspecError():
-                return f"Not understood: {error}. Is {self._path} the recorder, and of this version?"
             case _:
                 return str(error)
 

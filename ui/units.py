@@ -6,6 +6,7 @@ from datetime import datetime, timezone
 
 NOTHING = "-"
 """Shown where a quantity is not known."""
+_PREFIXES = (("k", 1e3), ("M", 1e6), ("G", 1e9), ("T", 1e12))
 
 
 def elapsed(seconds: float) -> str:
@@ -66,9 +67,8 @@ def count(number: int) -> str:
     """A counter in at most five characters: `0`, `9999`, `12.3k`, `4.5M`."""
     if number < 10_000:
         return str(number)
-    if number < 999_950:
-        return f"{number / 1000:.1f}k" if number < 99_950 else f"{number / 1000:.0f}k"
-    return f"{number / 1e6:.1f}M"
+    prefix, scale = next((entry for entry in _PREFIXES if number < 999.5 * entry[1]), _PREFIXES[-1])
+    return f"{number / scale:.{1 if number < 99.95 * scale else 0}f}{prefix}"
 
 
 def seconds(duration_s: float) -> str:

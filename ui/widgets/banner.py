@@ -8,7 +8,7 @@ from textual.containers import Vertical
 from textual.message import Message
 
 from ui.headline import Headline, headline
-from ui.letters import big
+from ui.letters import ROWS, big
 from ui.pieces import fit, plain
 from ui.situation import Situation
 from ui.tone import Tone
@@ -32,22 +32,26 @@ class Banner(Vertical):
     class Tapped(Message):
         """The banner was tapped or clicked."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._large = tuple(Line() for _ in range(ROWS))
+        self._detail, self._news, self._todo = Line(), Line(), Line()
+
     def compose(self) -> ComposeResult:
-        for _ in range(6):
-            yield Line()
+        yield from (*self._large, self._detail, self._news, self._todo)
 
     def show(self, situation: Situation) -> None:
         shown = headline(situation)
         for tone in Tone:
             self.set_class(tone is shown.tone, f"-{tone.value}")
         width = max(self.app.size.width - 2, 0)
-        *lines, news, todo = self.query(Line)
-        for line, text in zip(lines, (*_large(shown, width), fit(shown.detail, width)), strict=True):
+        for line, text in zip(self._large, _large(shown, width), strict=True):
             line.show(plain(text))
+        self._detail.show(plain(fit(shown.detail, width)))
         own = shown.tone in (shown.news_tone, Tone.GOOD) or shown.news_tone in (Tone.QUIET, Tone.GOOD)
-        news.show(((fit(shown.news, width), "" if own else shown.news_tone.badge),))
-        todo.show(plain(fit(shown.todo, width)))
-        todo.display = bool(shown.todo)
+        self._news.show(((fit(shown.news, width), "" if own else shown.news_tone.badge),))
+        self._todo.show(plain(fit(shown.todo, width)))
+        self._todo.display = bool(shown.todo)
 
     def on_click(self, event: events.Click) -> None:
         event.stop()

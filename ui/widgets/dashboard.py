@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 from textual.containers import Vertical
+from textual.message import Message
 from textual.widgets import Footer
 
 from ui.history import History
@@ -20,16 +21,24 @@ class Dashboard(Vertical):
 
     DEFAULT_CSS = "Dashboard { height: 1fr; }"
 
+    class Ready(Message):
+        """The parts can be shown. The app's own Ready event may come before that."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.notice = Notice()
+        self.table = SensorTable()
+        self._banner, self._vitals, self._verdict = Banner(), Vitals(), VerdictPanel()
+
     def compose(self) -> ComposeResult:
-        yield Banner()
-        yield Vitals()
-        yield VerdictPanel()
-        yield SensorTable()
-        yield Notice()
+        yield from (self._banner, self._vitals, self._verdict, self.table, self.notice)
         yield Footer(show_command_palette=False)
 
+    def on_mount(self) -> None:
+        self.post_message(self.Ready())
+
     def show(self, situation: Situation, history: History) -> None:
-        self.query_one(Banner).show(situation)
-        self.query_one(Vitals).show(situation)
-        self.query_one(VerdictPanel).show(situation)
-        self.query_one(SensorTable).show(situation, history)
+        self._banner.show(situation)
+        self._vitals.show(situation)
+        self._verdict.show(situation)
+        self.table.show(situation, history)

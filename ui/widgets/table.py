@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
+
 from textual.app import ComposeResult
 from textual.containers import VerticalScroll
 
@@ -11,6 +13,9 @@ from ui.sensors import columns, header, rows
 from ui.situation import Situation
 from ui.vitals import gnss_line
 from ui.widgets.line import Line
+
+ROWS = 24
+"""Made in advance: three sensors with all that can be wrong with them. More are added when needed."""
 
 
 class SensorTable(VerticalScroll, can_focus=False):
@@ -24,19 +29,23 @@ class SensorTable(VerticalScroll, can_focus=False):
     }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._rows = [Line() for _ in range(ROWS)]
+
     def compose(self) -> ComposeResult:
-        yield Line()
+        yield from self._rows
 
     def show(self, situation: Situation, history: History) -> None:
         lines = self._lines(situation, history)
-        shown = list(self.query(Line))
-        added = [Line() for _ in range(len(lines) - len(shown))]
+        added = [Line() for _ in range(len(lines) - len(self._rows))]
         if added:
+            self._rows.extend(added)
             self.mount(*added)
-        for line, pieces in zip(shown + added, lines, strict=False):
-            line.show(pieces, situation.stale)
-        for index, line in enumerate(shown + added):
-            line.display = index < len(lines)
+        for line, pieces in zip_longest(self._rows, lines):
+            line.display = pieces is not None
+            if pieces is not None:
+                line.show(pieces, situation.stale)
 
     def _lines(self, situation: Situation, history: History) -> list[Pieces]:
         widths = columns(self.app.size.width - 3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
+
 from textual.app import ComposeResult
 from textual.containers import Vertical
 
@@ -20,9 +22,12 @@ class VerdictPanel(Vertical):
     VerdictPanel { height: auto; margin: 1 1 0 1; display: none; }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._rows = tuple(Line() for _ in range(REASONS + 2))
+
     def compose(self) -> ComposeResult:
-        for _ in range(REASONS + 2):
-            yield Line()
+        yield from self._rows
 
     def show(self, situation: Situation) -> None:
         status = situation.status
@@ -31,7 +36,7 @@ class VerdictPanel(Vertical):
         if verdict is None:
             return
         lines = verdict_lines(verdict, REASONS)
-        for index, line in enumerate(self.query(Line)):
-            line.display = index < len(lines)
-            if line.display:
-                line.show(lines[index], situation.stale)
+        for line, pieces in zip_longest(self._rows, lines):
+            line.display = pieces is not None
+            if pieces is not None:
+                line.show(pieces, situation.stale)

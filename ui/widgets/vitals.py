@@ -17,16 +17,20 @@ class Cell(Vertical):
 
     DEFAULT_CSS = "Cell { height: 2; }"
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._label, self._value = Line(), Line()
+
     def compose(self) -> ComposeResult:
-        yield Line(classes="label")
-        yield Line(classes="value")
+        yield self._label
+        yield self._value
 
     def show(self, vital: Vital, stale: bool) -> None:
         style = vital.tone.text if vital.tone in (Tone.WARN, Tone.BAD) else Tone.QUIET.text
         label: Pieces = ((vital.label, style),)
         value: Pieces = ((vital.shown, "bold" if vital.tone is Tone.QUIET else vital.tone.text),)
-        self.query_one(".label", Line).show(label, stale)
-        self.query_one(".value", Line).show(value, stale)
+        self._label.show(label, stale)
+        self._value.show(value, stale)
 
 
 class Vitals(Grid):
@@ -39,11 +43,14 @@ class Vitals(Grid):
     }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._cells = tuple(Cell() for _ in LABELS)
+
     def compose(self) -> ComposeResult:
-        for _ in LABELS:
-            yield Cell()
+        yield from self._cells
 
     def show(self, situation: Situation) -> None:
         self.set_class(self.app.size.width < 72, "-narrow")
-        for cell, vital in zip(self.query(Cell), vitals(situation.status), strict=True):
+        for cell, vital in zip(self._cells, vitals(situation.status), strict=True):
             cell.show(vital, situation.stale)
