@@ -17,9 +17,9 @@ class GnssErrorModel:
     seed: int = 1
     sigma_fixed_m: tuple[float, float] = (0.012, 0.02)
     """Horizontal and vertical one-sigma of RTK fixed, of each of the other qualities likewise, under open sky."""
-    sigma_float_m: tuple[float, float] = (0.25, 0.45)
-    sigma_single_m: tuple[float, float] = (1.6, 3.0)
-    canopy_growth: float = 1.5
+    sigma_float_m: tuple[float, float] = (0.25, 0.4)
+    sigma_single_m: tuple[float, float] = (1.5, 2.5)
+    canopy_growth: float = 1.0
     """Sigmas grow by this factor more under closed canopy: multipath."""
     correlation_s: float = 20.0
     """Time constant of the Gauss-Markov errors."""
@@ -27,12 +27,12 @@ class GnssErrorModel:
     """Share of sigma that is white from epoch to epoch."""
     reported_scale: float = 1.0
     """Reported over true sigma: 1 is honest, 0.2 claims five times too much."""
-    signal_sigma: float = 0.12
+    signal_sigma: float = 0.1
     """Fluctuation of the signal (1 - canopy) that drives the quality, correlated over `signal_s`."""
     signal_s: float = 6.0
-    fixed_above: float = 0.55
-    float_above: float = 0.2
-    time_to_fix_s: float = 4.0
+    fixed_above: float = 0.36
+    float_above: float = 0.12
+    time_to_fix_s: float = 3.0
     """How long the signal must be good before float becomes fixed."""
     dropouts_per_min: float = 0.0
     dropout_s: tuple[float, float] = (15.0, 30.0)
