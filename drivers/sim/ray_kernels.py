@@ -4,6 +4,8 @@ Solids are rows of twelve numbers, in this order of kinds:
 frusta     base x y z, unit axis x y z, length, radius at base, radius a metre, reflectivity, tape lowest z, highest z
 ellipsoids centre x y z, horizontal, vertical semi-axis, extinction a metre, reflectivity
 boxes      centre x y z, half edges x y z, cos yaw, sin yaw, reflectivity
+
+Numba caches a caller by the age of its own file alone: after a change here, touch lidar_kernels.py.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ _MIX_B = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _TO_UNIT = 2.0**-53
 NEAREST_M = 1e-3
-Row = npt.NDArray[np.float32]
+Solids = npt.NDArray[np.float32]
 
 
 class RayGrid(NamedTuple):
@@ -59,14 +61,14 @@ def uniform(key: np.uint64, number: int) -> float:
 
 @njit(cache=True, nogil=True)
 def _frustum(
-    s: Row, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, best: float
+    s: Solids, n: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, best: float
 ) -> tuple[float, float]:
     """Distance and cosine of incidence of the first crossing from outside; best when there is none nearer."""
-    px, py, pz = ox - s[0], oy - s[1], oz - s[2]
-    da = dx * s[3] + dy * s[4] + dz * s[5]
-    pa = px * s[3] + py * s[4] + pz * s[5]
-    radius = s[7] + s[8] * pa
-    slope = s[8] * da
+    px, py, pz = ox - s[n, 0], oy - s[n, 1], oz - s[n, 2]
+    da = dx * s[n, 3] + dy * s[n, 4] + dz * s[n, 5]
+    pa = px * s[n, 3] + py * s[n, 4] + pz * s[n, 5]
+    radius = s[n, 7] + s[n, 8] * pa
+    slope = s[n, 8] * da
     a = 1.0 - da * da - slope * slope
     b = px * dx + py * dy + pz * dz - pa * da - radius * slope
     c = px * px + py * py + pz * pz - pa * pa - radius * radius
@@ -75,21 +77,21 @@ def _frustum(
         return best, 1.0
     t = (-b - math.sqrt(disc)) / a
     along = pa + t * da
-    if t <= NEAREST_M or t >= best or along < 0.0 or along > s[6]:
+    if t <= NEAREST_M or t >= best or along < 0.0 or along > s[n, 6]:
         return best, 1.0
-    at = s[7] + s[8] * along
-    qx, qy, qz = px + t * dx - along * s[3], py + t * dy - along * s[4], pz + t * dz - along * s[5]
+    at = s[n, 7] + s[n, 8] * along
+    qx, qy, qz = px + t * dx - along * s[n, 3], py + t * dy - along * s[n, 4], pz + t * dz - along * s[n, 5]
     cosine = -(qx * dx + qy * dy + qz * dz) / max(at, 1e-6)
     return t, cosine
 
 
 @njit(cache=True, nogil=True)
 def _ellipsoid(
-    s: Row, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, best: float, key: np.uint64, solid: int
+    s: Solids, n: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, best: float, key: np.uint64
 ) -> float:
     """Distance of the leaf that stops this ray (an exponential free path in the chord), or best."""
-    px, py, pz = (ox - s[0]) / s[3], (oy - s[1]) / s[3], (oz - s[2]) / s[4]
-    ex, ey, ez = dx / s[3], dy / s[3], dz / s[4]
+    px, py, pz = (ox - s[n, 0]) / s[n, 3], (oy - s[n, 1]) / s[n, 3], (oz - s[n, 2]) / s[n, 4]
+    ex, ey, ez = dx / s[n, 3], dy / s[n, 3], dz / s[n, 4]
     a = ex * ex + ey * ey + ez * ez
     b = px * ex + py * ey + pz * ez
     c = px * px + py * py + pz * pz - 1.0
@@ -100,17 +102,19 @@ def _ellipsoid(
     enter, leave = max((-b - root) / a, NEAREST_M), (-b + root) / a
     if leave <= enter or enter >= best:
         return best
-    t = enter - math.log(uniform(key, solid)) / s[5]
+    t = enter - math.log(uniform(key, n)) / s[n, 5]
     return t if t < leave and t < best else best
 
 
 @njit(cache=True, nogil=True)
-def _box(s: Row, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, best: float) -> tuple[float, float]:
+def _box(
+    s: Solids, n: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, best: float
+) -> tuple[float, float]:
     """Distance and cosine of incidence where the ray enters a box, or best."""
-    px, py = (ox - s[0]) * s[6] + (oy - s[1]) * s[7], (oy - s[1]) * s[6] - (ox - s[0]) * s[7]
-    ex, ey = dx * s[6] + dy * s[7], dy * s[6] - dx * s[7]
+    px, py = (ox - s[n, 0]) * s[n, 6] + (oy - s[n, 1]) * s[n, 7], (oy - s[n, 1]) * s[n, 6] - (ox - s[n, 0]) * s[n, 7]
+    ex, ey = dx * s[n, 6] + dy * s[n, 7], dy * s[n, 6] - dx * s[n, 7]
     enter, leave, cosine = -1e9, 1e9, 1.0
-    for p, e, half in ((px, ex, s[3]), (py, ey, s[4]), (oz - s[2], dz, s[5])):
+    for p, e, half in ((px, ex, s[n, 3]), (py, ey, s[n, 4]), (oz - s[n, 2], dz, s[n, 5])):
         if abs(e) < 1e-12:
             if abs(p) > half:
                 return best, 1.0
@@ -167,7 +171,8 @@ def trace(
     key decides, with each clump's number, which leaf stops the ray. radius: of a stem or branch, else infinite.
     """
     rows, columns = grid.height.shape[0] - 1, grid.height.shape[1] - 1
-    cell = grid.cell_m
+    cell, solids = grid.cell_m, grid.solids
+    entry_z, entry_solid = grid.entry_z, grid.entry_solid
     gx, gy = (ox - grid.origin[0]) / cell, (oy - grid.origin[1]) / cell
     i, j = math.floor(gx), math.floor(gy)
     step_i, step_j = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
@@ -190,26 +195,25 @@ def trace(
                     best, kind, cosine, radius = t0 + t, GROUND, slant, math.inf
                     reflectivity = float(grid.ground[j, i])
             for entry in range(grid.cell_start[place], grid.cell_start[place + 1]):
-                if grid.entry_z[entry, 0] > high:
+                if entry_z[entry, 0] > high:
                     break
-                if grid.entry_z[entry, 1] < low:
+                if entry_z[entry, 1] < low:
                     continue
-                solid = grid.entry_solid[entry]
-                s = grid.solids[solid]
+                solid = entry_solid[entry]
                 if solid < grid.frusta:
-                    t, slant = _frustum(s, ox, oy, oz, dx, dy, dz, best)
+                    t, slant = _frustum(solids, solid, ox, oy, oz, dx, dy, dz, best)
                     if t < best:
                         z = oz + t * dz
-                        best, cosine, reflectivity, radius = t, slant, float(s[9]), float(s[7])
-                        kind = TAPE if s[10] <= z <= s[11] else WOOD
+                        best, cosine, reflectivity, radius = t, slant, float(solids[solid, 9]), float(solids[solid, 7])
+                        kind = TAPE if solids[solid, 10] <= z <= solids[solid, 11] else WOOD
                 elif solid < grid.frusta + grid.ellipsoids:
-                    t = _ellipsoid(s, ox, oy, oz, dx, dy, dz, best, key, solid)
+                    t = _ellipsoid(solids, solid, ox, oy, oz, dx, dy, dz, best, key)
                     if t < best:
-                        best, kind, cosine, reflectivity, radius = t, LEAF, 1.0, float(s[6]), math.inf
+                        best, kind, cosine, reflectivity, radius = t, LEAF, 1.0, float(solids[solid, 6]), math.inf
                 else:
-                    t, slant = _box(s, ox, oy, oz, dx, dy, dz, best)
+                    t, slant = _box(solids, solid, ox, oy, oz, dx, dy, dz, best)
                     if t < best:
-                        best, kind, cosine, reflectivity, radius = t, MADE, slant, float(s[8]), math.inf
+                        best, kind, cosine, reflectivity, radius = t, MADE, slant, float(solids[solid, 8]), math.inf
         if dz > 0.0 and z1 > grid.top_m:
             break
         t0 = t1

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from drivers.sim.lidar import LEVER_M
+from drivers.sim.scene import Trees
 from drivers.sim.species import TRAITS
 from drivers.sim.world import World
 
@@ -45,14 +47,16 @@ def _poses(world: World, path: Path) -> None:
 
 
 def _stems(world: World, path: Path) -> None:
-    trees = world.trees
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(STEM_COLUMNS)
-        for k in range(len(trees)):
-            traits = TRAITS[trees.species[k]]
-            east, north, ground = trees.position_m[k]
-            lean_east, lean_north = trees.lean[k]
-            numbers = (east, north, ground, trees.dbh_m[k], trees.height_m[k], lean_east, lean_north)
-            row = [f"{number:.4f}" for number in (*numbers, trees.crown_radius_m[k])]
-            writer.writerow([k, traits.name, traits.scientific, *row, trees.clone[k], int(trees.taped[k])])
+        writer.writerows(stems_table(world.trees))
+
+
+def stems_table(trees: Trees) -> Iterator[list[str]]:
+    """One row a tree under `STEM_COLUMNS`. dbh_m is across the axis where it is 1.3 m above the ground."""
+    for k in range(len(trees)):
+        traits = TRAITS[trees.species[k]]
+        sizes = (trees.dbh_m[k], trees.height_m[k], *trees.lean[k], trees.crown_radius_m[k])
+        numbers = [f"{number:.4f}" for number in (*trees.position_m[k], *sizes)]
+        yield [str(k), traits.name, traits.scientific, *numbers, str(trees.clone[k]), str(int(trees.taped[k]))]
