@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Iterator
 
@@ -10,6 +11,7 @@ import msgspec
 
 from edge.cli import exit_codes
 from edge.cli.asking import connect
+from edge.control.client import ControlClient
 from edge.control.messages import Gnss, Host, Recording, Sensor, Status, Verdict
 
 HELP = """Show what the recorder does and how the sensors are
@@ -29,15 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """ControlError when the recorder cannot be reached."""
     with connect(args) as client:
-        if not args.watch:
-            status = client.status()
-            sys.stdout.write(_text(args, status))
-            return exit_codes.GOOD if _is_well(status) else exit_codes.WARNINGS
-        for status in client.subscribe():
-            clear = _CLEAR if sys.stdout.isatty() and not args.json else ""
-            sys.stdout.write(clear + _text(args, status))
-            sys.stdout.flush()
-    return exit_codes.GOOD
+        if args.watch:
+            return _watch(args, client)
+        status = client.status()
+        sys.stdout.write(_text(args, status))
+        return exit_codes.GOOD if _is_well(status) else exit_codes.WARNINGS
 
 
 def lines(status: Status) -> Iterator[str]:
@@ -54,6 +52,15 @@ def lines(status: Status) -> Iterator[str]:
         yield from _verdict_lines(status.verdict)
     for problem in status.problems:
         yield f"! {problem}"
+
+
+def _watch(args: argparse.Namespace, client: ControlClient) -> int:
+    clear = _CLEAR if sys.stdout.isatty() and not args.json else ""
+    with contextlib.suppress(KeyboardInterrupt):
+        for status in client.subscribe():
+            sys.stdout.write(clear + _text(args, status))
+            sys.stdout.flush()
+    return exit_codes.GOOD
 
 
 def _text(args: argparse.Namespace, status: Status) -> str:

@@ -68,7 +68,7 @@ class ControlServer:
 
     def publish(self, status: Status) -> None:
         """Send a state to every subscriber. Any thread; returns at once."""
-        if self._loop is None:
+        if self._loop is None or not self._subscribers:
             return
         with contextlib.suppress(RuntimeError):  # the loop is closed: nobody is left to hear it
             self._loop.call_soon_threadsafe(self._send_all, encode(status))

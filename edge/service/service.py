@@ -97,13 +97,23 @@ class Service:
     def _shut_down(self) -> None:
         self._notifier.stopping()
         self._judge.close()  # first: the session that ends now is validated when somebody asks for it
-        self._recorder.stop("the recorder was stopped")
+        self._finish_session()
         self._supervisor.stop()
         self._server.publish(self._health.status(time.monotonic_ns()))
         self._server.stop()
         if self._live is not None:
             self._live.stop()
         self._notifier.close()
+
+    def _finish_session(self) -> None:
+        """A slow card may need longer than the watchdog waits: it is fed on, while the writer gets on."""
+        finishing = threading.Thread(
+            target=self._recorder.stop, args=("the recorder was stopped",), name="finishing", daemon=True
+        )
+        finishing.start()
+        while finishing.is_alive():
+            finishing.join(TICK_S)
+            self.tick(time.monotonic_ns())
 
     def _tell_systemd(self) -> None:
         if self._health.alive:
