@@ -14,7 +14,7 @@ from edge.recording.ending import Ending, attachment_head, message_indexes
 from edge.recording.losses import Losses, Summary
 from edge.recording.report import RecoverReport
 from edge.recording.scan import HEADER_SIZE, PRIVATE, Record, RecordFile, parse
-from edge.recording.survey import ChunkPiece, DamagePiece, EndPiece, LoosePiece, Piece, indexed, survey
+from edge.recording.survey import ChunkPiece, DamagePiece, EndPiece, LoosePiece, Piece, agrees, indexed, survey
 
 _CHECKED_TAIL = 64 << 20
 """Bytes before the end in which checksums are tested: what was not yet on the disk when the power went is there."""
@@ -83,7 +83,7 @@ class _Finish:
         header = chunk_header(self._file, piece.record)
         index = indexed(self._file, piece.indexes)
         known = bool(self._ending.channels) and all(map(self._ending.defines, index))
-        if rebuild or not index or not known:
+        if rebuild or not index or not known or not agrees(index, header):
             try:
                 found = contents(chunk_body(self._file, header))
             except ChunkDamaged as damage:
@@ -127,7 +127,7 @@ class _Finish:
         last = sound[-1] if sound else None
         keep_end = last.end if last else header.end if header else 0
         kept = set(sound)
-        self._blank([piece for piece in pieces if piece not in kept and piece.end <= keep_end])
+        self._blank([_span(piece) for piece in pieces if piece not in kept and piece.end <= keep_end])
         at = last.record.end if isinstance(last, ChunkPiece) and self._closing else keep_end
         os.ftruncate(self._file.fd, at)
         closing = self._closing + self._ending.pack(at + len(self._closing))
@@ -136,11 +136,16 @@ class _Finish:
             closing, at = closing[written:], at + written
         os.fsync(self._file.fd)
 
-    def _blank(self, pieces: list[Piece]) -> None:
-        for piece in pieces:
-            start = piece.record.offset if isinstance(piece, ChunkPiece | LoosePiece) else piece.offset
-            length = piece.end - start - HEADER_SIZE
-            os.pwrite(self._file.fd, bytes([PRIVATE]) + length.to_bytes(8, "little"), start)
+    def _blank(self, spans: list[tuple[int, int]]) -> None:
+        """Turn spans of bytes into private records."""
+        if any(end - start < HEADER_SIZE for start, end in spans):
+            raise self._refusal("a few bytes in it are damaged that no record fits into")
+        for start, end in spans:
+            os.pwrite(self._file.fd, bytes([PRIVATE]) + (end - start - HEADER_SIZE).to_bytes(8, "little"), start)
+
+
+def _span(piece: Piece) -> tuple[int, int]:
+    return (piece.record.offset if isinstance(piece, ChunkPiece | LoosePiece) else piece.offset), piece.end
 
 
 def channel_of(file: RecordFile, index: Record) -> int:

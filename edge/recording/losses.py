@@ -5,13 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema, Statistics
+from mcap.records import Channel, McapRecord, Schema, Statistics
 
 from edge.recording.chunk import ChunkDamaged, chunk_header
 from edge.recording.ending import Ending, Index
 from edge.recording.report import Damage, RecoverReport
 from edge.recording.scan import HEADER_SIZE, Record, RecordFile, parse
 from edge.recording.survey import ChunkPiece, DamagePiece, EndPiece, indexed
+
+_SUMMARY_KINDS: dict[int, type[McapRecord]] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.STATISTICS: Statistics,
+}
 
 
 class Summary:
@@ -27,9 +33,7 @@ class Summary:
             self._take(file, record)
 
     def _take(self, file: RecordFile, record: Record) -> None:
-        kind = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.STATISTICS: Statistics}.get(
-            Opcode(record.opcode)
-        )
+        kind = _SUMMARY_KINDS.get(record.opcode)
         parsed = parse(file, record, kind) if kind else None
         if isinstance(parsed, Schema):
             self.schemas[parsed.id] = parsed

@@ -19,7 +19,7 @@ from types import TracebackType
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Footer, McapRecord, Metadata, Schema
+from mcap.records import Channel, Footer, Header, McapRecord, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from edge.errors import FormatError, RecordingError
@@ -74,9 +74,9 @@ class RecordFile:
         os.close(self.fd)
 
     def read(self, offset: int, length: int) -> bytes:
-        """Bytes at `offset`; fewer at the end of the file."""
+        """Bytes at `offset`; fewer at the end of the file, whatever a damaged length asks for."""
         try:
-            return os.pread(self.fd, length, offset)
+            return os.pread(self.fd, min(length, self.size - offset), offset) if offset < self.size else b""
         except OSError as error:
             raise RecordingError(
                 f"{self.path}: cannot read at byte {offset}: {error.strerror}; copy the card before doing more with it"
@@ -101,7 +101,7 @@ class RecordFile:
         first = self.record_at(len(MAGIC))
         if first is None or first.opcode != Opcode.HEADER or self.read(0, len(MAGIC)) != MAGIC:
             return None
-        return first
+        return first if parse(self, first, Header) else None
 
     def footer(self) -> Footer | None:
         """The Footer, None unless the file was finished and its summary is whole."""

@@ -11,6 +11,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from edge.errors import FormatError
+from edge.recording.chunk import ChunkHeader
 from edge.recording.scan import HEADER_SIZE, Record, RecordFile, plausible, resync
 
 
@@ -106,6 +107,15 @@ def _indexes(file: RecordFile, offset: int) -> tuple[tuple[Record, ...], int]:
             return tuple(found), offset
         found.append(record)
         offset = record.end
+
+
+def agrees(index: dict[int, list[tuple[int, int]]], header: ChunkHeader) -> bool:
+    """Whether message indexes, which have no checksum, can be those of a chunk with this header."""
+    return all(
+        header.start_ns <= log_time <= header.end_ns and offset < header.uncompressed_size
+        for entries in index.values()
+        for log_time, offset in entries
+    )
 
 
 def indexed(file: RecordFile, indexes: tuple[Record, ...]) -> dict[int, list[tuple[int, int]]]:

@@ -22,6 +22,7 @@ RUN_CHUNKS = 4
 _SIZE_LIMIT = 96 << 20
 """Bytes of chunks read at most per recording."""
 _MESSAGE = struct.Struct("<HIQQ")
+_LATEST_NS = 1 << 62
 _STAMPED_PREFIXES = ("sensor_msgs/msg/", "nav_msgs/msg/Odometry", "nmea_msgs/msg/Sentence")
 _STAMPED_ENDINGS = ("/CustomMsg", "/CompressedVideo", "Stamped")
 
@@ -115,6 +116,6 @@ def _take_head(body: bytes, offset: int, into: Heads, *, stamped: bool) -> None:
         order = "<" if body[at + _MESSAGE.size + 1] & 1 else ">"
         seconds, nanoseconds = struct.unpack_from(f"{order}iI", body, at + _MESSAGE.size + 4)
         stamp_ns = seconds * 1_000_000_000 + nanoseconds
-    into.log_ns.append(log_ns)
-    into.stamp_ns.append(stamp_ns)
+    into.log_ns.append(min(log_ns, _LATEST_NS))
+    into.stamp_ns.append(min(stamp_ns, _LATEST_NS))
     into.sequence.append(sequence)

@@ -277,3 +277,15 @@ def test_an_unfinished_file_is_not_readable_before(tmp_path):
     path.write_bytes(recording_bytes()[:5000])
     with pytest.raises((McapError, ValueError)), path.open("rb") as stream:
         make_reader(stream).get_summary()
+
+
+def test_damage_too_small_for_a_record_is_left_to_the_copy(tmp_path):
+    data = recording_bytes(finish=False)
+    path = tmp_path / "open.mcap.active"
+    path.write_bytes(data)
+    middle = chunks_of(path)[3].end
+    path.write_bytes(data[:middle] + b"\x00\x00" + data[middle:])
+    with pytest.raises(RecordingError, match="mapforest recover"):
+        finish_in_place(path)
+    recover(path, tmp_path / "copy.mcap")
+    assert read_messages(tmp_path / "copy.mcap") == streamed_messages(data)
