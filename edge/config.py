@@ -121,9 +121,14 @@ def load(path: Path | None) -> Config:
     """
     if path is None:
         return Config()
-    config = toml_table.convert(toml_table.read(path), Config, str(path))
+    return check(toml_table.read(path), str(path))
+
+
+def check(tables: dict[str, Any], source: str) -> Config:
+    """The configuration that parsed TOML says. ConfigError as `load`."""
+    config = toml_table.convert(tables, Config, source)
     for name in config.sensors:
-        sensor_settings(config, name, str(path))
+        sensor_settings(config, name, source)
     return config
 
 

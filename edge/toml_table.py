@@ -40,15 +40,21 @@ _WORDS = {
 def read(path: Path) -> dict[str, Any]:
     """The tables of a file. ConfigError names the file, and the line where the grammar is broken."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return parse(path.read_text(encoding="utf-8"), str(path))
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: no such configuration file; leave --config out to use the defaults") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); check its owner and mode") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8") from error
+
+
+def parse(text: str, source: str) -> dict[str, Any]:
+    """The tables of a text. ConfigError names the line where the grammar is broken."""
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+        raise ConfigError(f"{source}: not valid TOML: {error}") from error
 
 
 def convert(table: dict[str, Any], kind: type[StructT], source: str, key: str = "") -> StructT:

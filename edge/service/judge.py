@@ -15,6 +15,8 @@ import msgspec
 import psutil
 
 import edge
+from edge import toml_table
+from edge.config import check
 from edge.control.messages import Verdict
 from edge.errors import EdgeError
 from edge.recording import session as recording
@@ -29,11 +31,12 @@ _CLOSE_S = 2.0
 class Judge:
     """Validates one session after the other; `verdict` is the newest word."""
 
-    def __init__(self, config_path: Path | None, command: Callable[[Path], Sequence[str]] | None = None) -> None:
-        """command: the program that judges a folder and prints a Verdict as JSON."""
+    def __init__(self, config_toml: str, command: Callable[[Path], Sequence[str]] | None = None) -> None:
+        """config_toml: the configuration in effect; the file may have changed since. command: the program that judges
+        a folder by the configuration on its standard input, and prints a Verdict as JSON."""
         self.verdict: Verdict | None = None
-        self._config_path = config_path
-        self._command = command or self._own_command
+        self._config_toml = config_toml
+        self._command = command or _own_command
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
         self._closed = False
@@ -74,40 +77,46 @@ class Judge:
         return verdict
 
     def _ask(self, folder: Path) -> bytes:
-        process = subprocess.Popen(self._command(folder), stdout=subprocess.PIPE, cwd=_PROGRAM_FOLDER)
+        process = subprocess.Popen(
+            self._command(folder), stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=_PROGRAM_FOLDER
+        )
         with process:
             self._process = process
             if self._closed:
                 process.terminate()
-            output, _ = process.communicate()
+            output, _ = process.communicate(self._config_toml.encode())
             self._process = None
         if process.returncode != 0:
             raise OSError(f"the validator ended with code {process.returncode}; see the recorder's log")
         return output
 
-    def _own_command(self, folder: Path) -> list[str]:
-        words = [sys.executable, "-m", "edge.service.judge", str(folder.absolute())]
-        return [*words, str(self._config_path.absolute())] if self._config_path else words
+
+def _own_command(folder: Path) -> list[str]:
+    return [sys.executable, "-m", "edge.service.judge", str(folder.absolute())]
 
 
 def _unjudged(folder: Path, why: str) -> recording.Verdict:
     return recording.Verdict("WARN", (f"not validated: {why}; run `mapforest validate {folder}`",))
 
 
-def main(folder: Path, config_path: Path | None) -> int:
+def main(folder: Path, config_toml: str) -> int:
     """The process: judge, and print the verdict as JSON."""
     # Imported here: the service itself never loads the validator.
-    from edge.config import load  # noqa: PLC0415
     from edge.validation.validate import validate  # noqa: PLC0415
 
     os.nice(_NICENESS)
     with contextlib.suppress(psutil.Error, OSError):  # a sandbox may forbid it
         psutil.Process().ionice(psutil.IOPRIO_CLASS_IDLE)
-    report = validate(folder, load(config_path))
+    source = "the recorder's configuration"
+    try:
+        report = validate(folder, check(toml_table.parse(config_toml, source), source))
+    except EdgeError as error:
+        log.error("%s", error)  # noqa: TRY400 - it is a sentence for people
+        return 1
     sys.stdout.buffer.write(msgspec.json.encode(recording.Verdict(report.verdict, tuple(report.reasons))))
     return 0
 
 
 if __name__ == "__main__":
     logging.basicConfig(level=logging.WARNING)
-    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2]) if len(sys.argv) > 2 else None))
+    sys.exit(main(Path(sys.argv[1]), sys.stdin.read()))

@@ -7,11 +7,10 @@ import threading
 import time
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
 from drivers import registry
 from drivers.driver import Driver
-from edge.config import Config, sensor_driver, sensor_settings
+from edge.config import Config, sensor_driver, sensor_settings, to_toml
 from edge.control.messages import Reply, Request, Status
 from edge.paths import control_socket, recordings_folder
 from edge.recording.session import repair_leftovers
@@ -36,7 +35,6 @@ class Service:
     def __init__(
         self,
         config: Config,
-        config_path: Path | None = None,
         *,
         plans: Sequence[Plan] | None = None,
         judge: Judge | None = None,
@@ -48,7 +46,7 @@ class Service:
         self._live = LiveView(config) if config.live.enabled else None
         self._intake = Intake((self._live.offer,) if self._live else ())
         self._supervisor = Supervisor(driver_plans(config) if plans is None else plans, self._intake.take)
-        self._judge = judge or Judge(config_path)
+        self._judge = judge or Judge(to_toml(config))
         self._recorder = Recorder(config, self._intake, self._supervisor, self._judge)
         self._health = Health(config, self._supervisor, self._intake, self._recorder, self._judge)
         self._server = ControlServer(control_socket(config), self, config.control.group, SOFTWARE)

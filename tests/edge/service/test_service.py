@@ -64,7 +64,7 @@ def notifier() -> FakeNotifier:
 
 @pytest.fixture
 def service(tmp_path: Path, driver: FakeDriver, notifier: FakeNotifier) -> Service:
-    judge = Judge(None, lambda _folder: [sys.executable, "-c", VERDICT])
+    judge = Judge("", lambda _folder: [sys.executable, "-c", VERDICT])
     plans = [Plan("fake", lambda: driver)]
     return Service(config(tmp_path), plans=plans, judge=judge, notifier=notifier)
 
