@@ -58,6 +58,10 @@ class DatagramOrder:
         held, self._held = self._held, None
         return [] if held is None else [self._passed(held)]
 
+    def restart(self) -> None:
+        """A new stream begins: its counters are its own."""
+        self._held, self._counter = None, None
+
     def _unaligned(self, datagram: bytes, receive_ns: int) -> list[Arrival]:
         self._unaligned_run += 1
         if self._unaligned_run > UNALIGNED_LIMIT:

@@ -76,7 +76,7 @@ class Receiver:
         self._thread.start()
 
     def close(self) -> None:
-        """End, give what is still inside, join. Once."""
+        """End and join. A half-received access unit goes."""
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
@@ -117,8 +117,6 @@ class Receiver:
                 self._ending.wait(HOLD_S)
                 continue
             self._datagram(datagram, sender[0], time.monotonic_ns())
-        self._feed(self.order.release())
-        self._flush()
 
     def _stay_alive(self) -> None:
         camera = self._camera
@@ -137,8 +135,8 @@ class Receiver:
             return
         if self._restart.is_set():
             self._restart.clear()
-            self._feed(self.order.release())
-            self._flush()
+            self.order.restart()
+            self.demuxer.restart()
             self._frames.restarted()
         self.last_datagram_s = receive_ns / 1e9
         self._flushed = False

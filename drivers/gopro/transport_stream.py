@@ -78,13 +78,21 @@ class Demuxer:
         return units
 
     def flush(self) -> list[AccessUnit]:
-        """Give what is complete when nothing more comes: the last access unit has no successor to end it."""
+        """Give what is there when nothing more comes: the last access unit has no successor to end it.
+
+        If the end of that one was lost, nothing in the stream says so.
+        """
         units: list[AccessUnit] = []
         if len(self._rest) == PACKET and self._rest[0] == SYNC:
             self._packet(self._rest, self._rest_ns, units)
             self._rest = b""
         self._finish(units)
         return units
+
+    def restart(self) -> None:
+        """A new stream begins: what the old one left unfinished goes, uncounted."""
+        self._pes.finish()
+        self._counter, self._last = None, b""
 
     def _resync(self, data: bytes, position: int) -> int:
         """Offset of the next sync byte that has another one a packet later, or -(offset to keep) - 1."""

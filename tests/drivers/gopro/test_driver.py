@@ -11,6 +11,14 @@ from tests.drivers.gopro.rig import Running, config, emulator, loopback_address,
 from tests.waiting import wait_for
 
 
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch):
+    """A camera that is busy for a moment only, and a driver that looks again soon."""
+    monkeypatch.setattr("drivers.sim.gopro_device.BUSY_S", 0.05)
+    monkeypatch.setattr("drivers.gopro.patience.POLL_S", 0.1)
+    monkeypatch.setattr("drivers.gopro.streams.POLL_S", 0.1)
+
+
 @contextmanager
 def camera(*faults, **options):
     emulated = emulator(*faults, **options)
