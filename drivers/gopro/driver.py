@@ -7,7 +7,7 @@ import time
 from threading import Event
 
 from drivers.driver import Emit, SensorHealth, SensorState
-from drivers.errors import DriverError, SensorUnreachable, SensorUnsupported
+from drivers.errors import DriverError, SensorRefused, SensorUnreachable, SensorUnsupported
 from drivers.gopro import usb
 from drivers.gopro.api import Camera
 from drivers.gopro.card import CardRecording
@@ -63,9 +63,6 @@ class Sensor:
         flowing = last_ns > 0 and time.monotonic_ns() - last_ns < FLOWING_NS
         receiver = self._receiver
         facts = {} if receiver is None else _stream_facts(self._config, receiver, self._frames)
-        if receiver is not None and receiver.failure:
-            trouble = Trouble(f"Camera stream failed: {receiver.failure}", "Restart the recorder.")
-            self._report.set(SensorState.FAILED, trouble)
         return self._report.health(self.name, stream, flowing, self._frames.clock_state(), facts)
 
     def session_started(self) -> None:
@@ -80,6 +77,10 @@ class Sensor:
         """One connection, from search to loss."""
         try:
             receiver.open(self._config.host, self._config.stream_port)
+        except SensorRefused as error:
+            self._fail(SensorState.FAILED, error, "Close the other program on that port; the camera knows no other.")
+            return
+        try:
             receiver.start()
             self._link = link = self._connect(self._camera(self._config.timeout_s), receiver)
             link.prepare(stop)
@@ -106,7 +107,7 @@ class Sensor:
         stream: Stream = Preview(camera) if config.mode == "wifi" else Webcam(camera, config)
         records = config.mode == "wifi" and config.record_on_camera
         card = CardRecording(camera, self._wanted, self._tell) if records else None
-        return Link(
+        link = Link(
             camera,
             stream,
             card=card,
@@ -116,6 +117,9 @@ class Sensor:
             report=self._report,
             tell=self._tell,
         )
+        if self._link is not None:
+            link.inherit(self._link)
+        return link
 
     def _say_goodbye(self, link: Link) -> None:
         for failure in link.leave():

@@ -59,12 +59,18 @@ class Link:
         self.touched = False
         """The camera was told something that has to be undone at the end."""
 
+    def inherit(self, before: Link) -> None:
+        """What an earlier connection left running is to be ended by this one."""
+        self.touched = before.touched
+        if self._card is not None and before._card is not None:
+            self._card.active = before._card.active
+
     def prepare(self, stop: Event) -> None:
         """Identify, wait until ready, set up."""
         info = self._camera.identify()
         with self._report.lock:
             self._report.info, self._report.address = info, self._camera.address
-        self._report.set(SensorState.STARTING)
+        self._report.starting()
         self._tell(Severity.INFO, f"camera found: {info.model}, firmware {info.firmware}, serial {info.serial}")
         now = self._wait_until_ready(stop)
         if now is None:
@@ -80,6 +86,8 @@ class Link:
         self._start_stream(stop, again=False)
         self._report.set(SensorState.OK)
         while not stop.is_set():
+            if self._receiver.failure:
+                raise ProtocolError(f"the camera's stream broke the driver: {self._receiver.failure}")
             self._poll()
             if self._card is not None and self._card.tend(stop) and not stop.is_set():
                 self._start_stream(stop, again=True)

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from drivers.errors import SensorUnreachable
+from drivers.errors import SensorRefused
 from drivers.gopro.datagrams import Arrival, DatagramOrder
 from drivers.gopro.frames import FrameBuilder
 from drivers.gopro.keepalive import KEEP_ALIVE, KeepAlive
@@ -52,7 +52,7 @@ class Receiver:
         """Monotonic time of the newest datagram of the camera."""
 
     def open(self, host: str, port: int) -> None:
-        """Bind. SensorUnreachable says what is in the way."""
+        """Bind, unless it is done already. SensorRefused says what is in the way."""
         if self._socket is not None:
             return
         opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -61,9 +61,7 @@ class Receiver:
             opened.bind((host, port))
         except OSError as error:
             opened.close()
-            raise SensorUnreachable(
-                f"UDP port {port} of {host or 'this computer'} cannot be opened: {error}. Another player on it?"
-            ) from error
+            raise SensorRefused(f"UDP port {port} of {host or 'this computer'} cannot be opened: {error}") from error
         opened.settimeout(HOLD_S)
         self._socket = opened
 
@@ -71,6 +69,7 @@ class Receiver:
         """Receive from now on. Does nothing when it does already."""
         if self._thread is not None and self._thread.is_alive():
             return
+        self.failure = ""
         self._ending.clear()
         self._thread = threading.Thread(target=self._root, name="gopro-stream", daemon=True)
         self._thread.start()

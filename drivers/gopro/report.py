@@ -34,6 +34,12 @@ class Report:
         with self.lock:
             self.phase, self.trouble = phase, trouble
 
+    def starting(self) -> None:
+        """Reached again. What was wrong before stays on the screen until it turns out to be over."""
+        with self.lock:
+            self.trouble = self.trouble if self.phase is SensorState.FAILED else None
+            self.phase = SensorState.STARTING
+
     def health(
         self, name: str, stream: StreamHealth, flowing: bool, clock: ClockState | None, facts: dict[str, str]
     ) -> SensorHealth:

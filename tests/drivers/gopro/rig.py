@@ -18,6 +18,8 @@ from drivers.sim.gopro_device import Quirks
 from drivers.sim.gopro_emulator import Emulator
 
 _numbers = itertools.count(random.SystemRandom().randrange(1, 1 << 22))
+STREAM_PORT = random.SystemRandom().randrange(20_000, 32_000)
+"""Not the camera's 8554: a driver under another test may listen there on all addresses."""
 
 
 def loopback_address() -> str:
@@ -58,7 +60,7 @@ def emulator(*faults: str, quirks: Quirks | None = None, source=None, truth=None
     plan = FaultPlan("gopro", [parse(fault) for fault in faults])
     epoch_ns = time.monotonic_ns()
     return Emulator(
-        source or TinySource(), plan, epoch_ns, address or loopback_address(), port, truth=truth, quirks=quirks
+        source or TinySource(), plan, epoch_ns, address or loopback_address(), port, STREAM_PORT, truth, quirks
     )
 
 
@@ -71,6 +73,8 @@ class Running:
     events: list[SensorEvent] = field(default_factory=list)
 
     def __enter__(self) -> "Running":
+        if hasattr(self, "sensor"):
+            return self
         self.sensor = Sensor("gopro", self.config)
         self.stop = threading.Event()
         self.thread = threading.Thread(target=self.sensor.run, args=(self._emit, self.stop))
@@ -95,4 +99,4 @@ class Running:
 def config(address: str, http_port: int, **changes) -> Config:
     """Of a driver on its own loopback address, impatient."""
     values = {"host": loopback_address(), "timeout_s": 1.0, "retry_s": 0.2, "poll_s": 0.5, "stall_s": 0.6, **changes}
-    return Config(address=address, http_port=http_port, **values)
+    return Config(address=address, http_port=http_port, stream_port=STREAM_PORT, **values)

@@ -6,7 +6,7 @@ import threading
 
 from drivers.sim.clip import ClipSource
 from drivers.sim.gopro_device import Hero8
-from tests.drivers.gopro.rig import Running, config, emulator, loopback_address
+from tests.drivers.gopro.rig import STREAM_PORT, Running, config, emulator, loopback_address
 from tests.drivers.gopro.test_transport_stream import CLIP, ffmpeg_packets, needs_clip, remuxed_clip
 from tests.waiting import wait_for
 
@@ -20,7 +20,7 @@ class FfmpegCamera:
     def __init__(self, stream: bytes):
         self.address, self.stream, device = loopback_address(), stream, Hero8(lambda: 1000.0)
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.udp.bind((self.address, 8554))
+        self.udp.bind((self.address, STREAM_PORT))
         self.sender = None
         camera = self
 
@@ -55,7 +55,7 @@ class FfmpegCamera:
     def send(self, host):
         breath = threading.Event()
         for number, at in enumerate(range(0, len(self.stream), 1316)):
-            self.udp.sendto(self.stream[at : at + 1316], (host, 8554))
+            self.udp.sendto(self.stream[at : at + 1316], (host, STREAM_PORT))
             if number % BURST == 0:
                 breath.wait(0.01)
 

@@ -1,5 +1,6 @@
 """The driver against the emulated camera, end to end over loopback."""
 
+import socket
 import threading
 from contextlib import contextmanager
 
@@ -7,7 +8,7 @@ import pytest
 
 from drivers.driver import SensorState
 from drivers.sim.gopro_device import Quirks
-from tests.drivers.gopro.rig import Running, config, emulator, loopback_address, tiny_units
+from tests.drivers.gopro.rig import STREAM_PORT, Running, config, emulator, loopback_address, tiny_units
 from tests.waiting import wait_for
 
 
@@ -94,7 +95,7 @@ def test_usb_streams_without_recording_and_leaves_webcam_mode():
             assert not emulated.device.recording
         assert emulated.device.webcam == 0
         asked = list(emulated.device.requests)
-        assert asked.index("/gp/gpWebcam/STOP") < asked.index("/gp/gpWebcam/START?res=12&port=8554")
+        assert asked.index("/gp/gpWebcam/STOP") < asked.index(f"/gp/gpWebcam/START?res=12&port={STREAM_PORT}")
 
 
 def test_usb_asks_again_when_the_first_start_does_nothing(monkeypatch):
@@ -113,7 +114,7 @@ def test_kept_alive_the_picture_never_freezes(monkeypatch):
 def test_a_silent_stream_is_started_again_and_then_the_operator_is_told_where_to_look():
     with camera("gopro:stall@1.5") as emulated, Running(of(emulated)) as driver:
         wait_for(lambda: driver.told("camera stream is silent"))
-        wait_for(lambda: "nothing arrives on UDP port 8554" in driver.sensor.health().problem)
+        wait_for(lambda: f"nothing arrives on UDP port {STREAM_PORT}" in driver.sensor.health().problem)
         health = driver.sensor.health()
         assert health.state is SensorState.FAILED
         assert "firewall" in health.advice
@@ -171,6 +172,28 @@ def test_nobody_there_is_searching_and_stops_at_once():
         wait_for(lambda: driver.sensor.health().problem)
         assert driver.sensor.health().state is SensorState.SEARCHING
         assert driver.sensor.health().advice
+
+
+def test_a_taken_stream_port_is_said_and_taken_over_once_free():
+    with camera() as emulated:
+        wanted = of(emulated)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as player:
+            player.bind((wanted.host, STREAM_PORT))
+            driver = Running(wanted).__enter__()
+            wait_for(lambda: f"UDP port {STREAM_PORT}" in driver.sensor.health().problem)
+            assert driver.sensor.health().state is SensorState.FAILED
+        with driver:
+            wait_for(lambda: driver.frames)
+
+
+def test_a_dead_stream_thread_turns_red_and_is_started_again(monkeypatch):
+    with camera() as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: driver.frames)
+        with monkeypatch.context() as broken:
+            broken.setattr("drivers.gopro.h264.kind", lambda data: 1 / 0)
+            wait_for(lambda: "ZeroDivisionError" in driver.sensor.health().problem)
+        before = len(driver.frames)
+        wait_for(lambda: len(driver.frames) > before + 5)
 
 
 @pytest.mark.parametrize("fault", ["gopro:duplicate=0.3", "gopro:reorder=0.2", "gopro:garbage=40"])

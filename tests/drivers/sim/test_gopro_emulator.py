@@ -17,7 +17,7 @@ from drivers.sim.clip import ClipSource
 from drivers.sim.faults import FaultPlan, parse
 from drivers.sim.gopro_device import Hero8, Quirks
 from drivers.sim.gopro_line import BadLine, StreamClock
-from tests.drivers.gopro.rig import emulator, loopback_address
+from tests.drivers.gopro.rig import STREAM_PORT, emulator, loopback_address
 from tests.waiting import wait_for
 
 CLIP = Path(__file__).parents[3] / "../shared/data/gopro/max-heromode.mp4"
@@ -110,7 +110,7 @@ def test_datagrams_are_seven_packets_and_the_truth_matches_the_stream(tmp_path):
     camera.start()
     demuxer, units = Demuxer(), []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
-        ear.bind((host, 8554))
+        ear.bind((host, STREAM_PORT))
         ear.settimeout(3)
         Camera(camera._address, camera.http_port, host).preview(start=True)
         while len(units) < 30:
