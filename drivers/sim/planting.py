@@ -16,6 +16,7 @@ CLEARANCE_M = 1.3
 SUCKER_SPREAD_M = 2.2
 SUCKER_SPACING_M = 0.5
 SMALLEST_DBH_M = 0.03
+MATURE_DBH_M = 0.12
 BREAST_M = 1.3
 
 
@@ -129,7 +130,8 @@ def _inventory(
     spread = np.array([traits.crown_per_dbh for traits in TRAITS])[species]
     spread_at_first = 0.45
     dbh = np.minimum(dbh, np.where(species == Species.SUMAC, 0.10, 0.95))
-    height = BREAST_M + 1.2 + ceiling * (1.0 - np.exp(-growth * dbh)) * rng.uniform(0.85, 1.15, len(dbh))
+    young = np.minimum(dbh / MATURE_DBH_M, 1.0) ** 0.7
+    height = BREAST_M + 0.8 + ceiling * (1.0 - np.exp(-growth * dbh)) * young * rng.uniform(0.85, 1.15, len(dbh))
     lean = np.tan(np.abs(rng.normal(0.0, config.lean_deg, len(dbh))) * np.pi / 180.0)
     bearing = rng.uniform(0.0, 2.0 * np.pi, len(dbh))
     return Trees(

@@ -33,7 +33,7 @@ class Leaf(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Height (m) of a stem of diameter d (m) is 1.3 + ceiling_m * (1 - exp(-growth_per_m * d)).
+    """Height (m) of a grown stem of diameter d (m): 2.1 + ceiling_m * (1 - exp(-growth_per_m * d)); saplings are lower.
 
     crown_start: share of the height below the crown. crown_per_dbh: crown radius (m) a metre of diameter.
     extinction_per_m: of a beam inside a clump of leaves. frond_m: length of the pinnate leaf, 0 without.

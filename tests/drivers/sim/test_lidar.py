@@ -34,7 +34,7 @@ def _frustum(origin, direction, ends, radii):
     along = np.array([direction @ axis, offset @ axis])
     radial = np.array([taper * along[0], radius + taper * along[1]])
     square = np.array([1.0, 2.0 * offset @ direction, offset @ offset])
-    roots = np.roots(square - np.polymul(along, along) - np.polymul(radial, radial))
+    roots = np.roots(square - np.convolve(along, along) - np.convolve(radial, radial))
     reals = sorted(root.real for root in roots if abs(root.imag) < 1e-12 and root.real > 1e-3)
     return next((t for t in reals if 0.0 <= np.polyval(along, t) <= length), np.inf)
 
@@ -64,7 +64,9 @@ def _ellipsoid(origin, direction, centre, wide, tall):
     p, d = (origin - centre) / shrink, direction / shrink
     a, b, c = d @ d, p @ d, p @ p - 1.0
     disc = b * b - a * c
-    return (-b - np.sqrt(disc)) / a if disc > 0 and b < 0 and c > 0 else np.inf
+    if c < 0:
+        return 0.001
+    return (-b - np.sqrt(disc)) / a if disc > 0 and b < 0 else np.inf
 
 
 def _box(origin, direction, centre, half, yaw):
@@ -124,7 +126,7 @@ def test_rays_end_where_brute_force_says(small):
     assert inside.sum() > 120
     assert len(set(kind[inside].tolist())) >= 3
     agree = np.abs(got[inside] - want[inside]) < 2e-3
-    assert agree.mean() > 0.99, "float32 solids may lose a grazing ray"
+    assert agree.mean() > 0.995, "float32 solids may lose a grazing ray"
     assert (got[~inside] == 60.0).all()
 
 
