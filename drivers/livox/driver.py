@@ -62,6 +62,7 @@ class Sensor:
         finally:
             for thread in threads:
                 thread.join()
+            receiver.close()
 
     def health(self) -> SensorHealth:
         """See `Driver.health`."""

@@ -20,6 +20,8 @@ PACKET_NS = 480_000
 POINT_INTERVAL = 4750
 """time_interval of every point packet: 475.0 us from its first point to its last, in 0.1 us."""
 INTERVAL_UNIT_NS = 100
+LATEST_NS = 1 << 62
+"""Times are signed 64-bit from here on; this is the year 2116."""
 CRC_OFFSET = 24
 CRC_START = 28
 """The checksum covers timestamp and data."""
@@ -90,7 +92,7 @@ def well_formed(head: npt.NDArray[Any], lengths: npt.NDArray[np.int64]) -> npt.N
     """Which datagrams are packets by their headers; `lengths` are those of the datagrams. Checksums not included."""
     size = _RECORD_BYTES[head["data_type"]]
     expected = HEADER.itemsize + size * head["dot_num"]
-    known = (size > 0) & (head["dot_num"] > 0) & (head["version"] == 0)
+    known = (size > 0) & (head["dot_num"] > 0) & (head["version"] == 0) & (head["timestamp"] < LATEST_NS)
     return np.asarray(known & (head["length"] == lengths) & (expected == lengths))
 
 

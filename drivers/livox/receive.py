@@ -107,13 +107,15 @@ class Receiver:
         return sum(source.kernel_drops for source in self._sources)
 
     def run(self, stop: Event) -> None:
-        """Thread body. Sockets may be opened before or after it starts; it closes them at its end."""
-        try:
-            while not stop.is_set():
-                self._turn(stop)
-        finally:
-            for source in self._sources:
-                source.socket.close()
+        """Thread body. Sockets may be opened before or after it starts."""
+        while not stop.is_set():
+            self._turn(stop)
+
+    def close(self) -> None:
+        """Close the sockets, when no thread uses them any more."""
+        for source in self._sources:
+            source.socket.close()
+        self._sources = []
 
     def wait(self, timeout_s: float) -> bool:
         """Whether datagrams came within the time."""

@@ -17,6 +17,8 @@ SCANS_HZ = 10.0
 IMU_HZ = 200.0
 FLOWING_S = 1.0
 """Data this recent count as flowing."""
+STATUS_FRESH_S = 1.5
+"""The LiDAR pushes its status every second."""
 
 
 class Reporter:
@@ -74,8 +76,7 @@ class Reporter:
         if fault and fault.level >= Level.FATAL:
             yield SensorState.FAILED, fault.text, fault.advice
         if not points and not inertial:
-            problem = steward.problem or f"no data yet, the LiDAR is in state {self._work_state()}"
-            yield steward.state, problem, steward.advice
+            yield self._silence(now_ns)
         if not points or not inertial:
             missing = "IMU data" if points else "points"
             yield SensorState.DEGRADED, f"no {missing}", "restart the LiDAR if this lasts"
@@ -87,6 +88,19 @@ class Reporter:
             yield SensorState.DEGRADED, f"{dropped} packets came too fast for this host", _BUFFER_ADVICE
         if lost > 0:
             yield SensorState.DEGRADED, f"{lost} packets lost since the last report", "check the Ethernet cable"
+
+    def _silence(self, now_ns: int) -> tuple[SensorState, str, str]:
+        """Why nothing comes: never reached, starting, or lost."""
+        steward, last_ns = self._steward, self._decoder.point_meter.last_ns
+        if steward.problem:
+            return steward.state, steward.problem, steward.advice
+        if last_ns is not None and steward.status_age_s() > STATUS_FRESH_S:
+            return (
+                SensorState.SEARCHING,
+                f"silent for {(now_ns - last_ns) / 1e9:.0f} s",
+                "check its power and the cable",
+            )
+        return steward.state, f"no data, the LiDAR is in state {self._work_state()}", ""
 
     def _work_state(self) -> str:
         status = self._steward.status

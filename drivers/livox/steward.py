@@ -77,6 +77,10 @@ class Steward:
         """Write the configuration again soon: the LiDAR seems to have started anew. From any thread."""
         self._configure_again.set()
 
+    def status_age_s(self) -> float:
+        """Time since the LiDAR last said how it is."""
+        return _age_s(self._status_ns)
+
     def run(self, stop: Event) -> None:
         """Thread body."""
         while not stop.is_set():
@@ -178,7 +182,7 @@ class Steward:
             for sender, values in listener.pushes():
                 if sender == self.address:
                     self._heard(read_status(values))
-            if _age_s(self._status_ns) > PUSH_OVERDUE_S:
+            if self.status_age_s() > PUSH_OVERDUE_S:
                 self._heard(read_status(link.read(STATUS_KEYS)))
             if self._configure_again.is_set():
                 self._configure(link)

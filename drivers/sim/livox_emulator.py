@@ -153,12 +153,16 @@ class Emulator:
             self._oscillator.step(round(fault.value * 1e9))
         for _ in plan.due("reboot", t_s):
             self.device.machine.reboot(now_ns)
+        if self._channel.levels.garbage_hz:
+            self._litter((now_ns - self._last_turn_ns) / 1e9)
+        self._last_turn_ns = now_ns
+
+    def _litter(self, elapsed_s: float) -> None:
         sockets = [self.points.socket, self.imu.socket, self._status, self._commands]
         to = [(host.address, host.port) for host in map(self.device.setting, _DESTINATIONS)]
         if self._commander is not None:
             to.append(self._commander)
-        self._channel.litter(sockets, to, (now_ns - self._last_turn_ns) / 1e9)
-        self._last_turn_ns = now_ns
+        self._channel.litter(sockets, to, elapsed_s)
 
     def _stream(self, now_ns: int, paused: bool) -> None:
         """Send the packets that are due. During a pause none are made, and the counters stand still."""

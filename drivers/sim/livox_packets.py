@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import struct
 import zlib
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from drivers.livox.packets import CRC_OFFSET, CRC_START, HEADER, POINT_INTERVAL, POINTS_PER_PACKET, RECORDS, DataType
+from drivers.livox.packets import HEADER, POINT_INTERVAL, POINTS_PER_PACKET, RECORDS, DataType
 from drivers.sim.sources import PointBlock
+
+IMU_BYTES = 60
+_IMU_HEAD = struct.Struct("<BHHHHBBB12x")
+_IMU_BODY = struct.Struct("<Q6f")
 
 
 def point_packets(
@@ -50,13 +55,6 @@ def imu_packet(
     gyro_rad_s: tuple[float, float, float], accel_g: tuple[float, float, float], stamp_ns: int, count: int
 ) -> bytes:
     """One IMU packet, with a valid checksum as on hardware."""
-    packet = np.zeros(1, np.dtype([("head", HEADER), ("imu", RECORDS[DataType.IMU])]))
-    head = packet["head"]
-    head["length"] = packet.itemsize
-    head["dot_num"] = 1
-    head["udp_cnt"] = count & 0xFFFF
-    head["timestamp"] = stamp_ns
-    packet["imu"]["gyro"] = gyro_rad_s
-    packet["imu"]["accel"] = accel_g
-    raw = packet.tobytes()
-    return raw[:CRC_OFFSET] + zlib.crc32(raw[CRC_START:]).to_bytes(4, "little") + raw[CRC_START:]
+    head = _IMU_HEAD.pack(0, IMU_BYTES, 0, 1, count & 0xFFFF, 0, DataType.IMU, 0)
+    body = _IMU_BODY.pack(stamp_ns, *gyro_rad_s, *accel_g)
+    return head + zlib.crc32(body).to_bytes(4, "little") + body
