@@ -29,8 +29,8 @@ _NO_FIX = "no fix"
 _HEAD = 160
 """Bytes of a NavSatFix up to its latitude, with a frame name of up to 80 characters."""
 _MESSAGE_HEAD = HEADER_SIZE + 22
-_SAMPLED_CHUNKS = 60
-"""Compressed chunks read at most; in between, fixes are not looked at."""
+_SAMPLED_CHUNKS, _SAMPLED_PLACES = 60, 1200
+"""Chunks whose fixes are looked at, at most: compressed ones are read whole, of others only the fixes."""
 
 
 def share_of(files: Sequence[FileIndex], topic: str, said: Told | None) -> GnssShare | None:
@@ -45,7 +45,7 @@ def share_of(files: Sequence[FileIndex], topic: str, said: Told | None) -> GnssS
     sampled = False
     for index in files:
         if topic in index.series and index.topics[topic].type_name.endswith("/NavSatFix"):
-            sampled |= _count(index, index.series[topic], qualities, max(2, _SAMPLED_CHUNKS // len(files)))
+            sampled |= _count(index, index.series[topic], qualities, len(files))
     return _share(qualities, "a sample of the fixes" if sampled else "every fix")
 
 
@@ -56,13 +56,15 @@ def _share(qualities: Counter[str], source: str) -> GnssShare | None:
     return GnssShare(epochs, 1 - qualities[_NO_FIX] / epochs, dict(qualities.most_common()), source)
 
 
-def _count(index: FileIndex, series: Series, qualities: Counter[str], chunks: int) -> bool:
+def _count(index: FileIndex, series: Series, qualities: Counter[str], files: int) -> bool:
     """Count the fixes of one file. Returns whether only some of them were read."""
     compressed = any(index.compressions.keys() - {""})
     ordinals = sorted({int(ordinal) for ordinal in series.chunk if ordinal >= 0})
-    chosen = ordinals[:: math.ceil(len(ordinals) / chunks)] if compressed and ordinals else ordinals
+    most = max(2, (_SAMPLED_CHUNKS if compressed else _SAMPLED_PLACES) // files)
+    chosen = ordinals[:: math.ceil(len(ordinals) / most)] if ordinals else ordinals
     keep = set(chosen)
     with RecordFile(index.path) as file:
+        file.read_scattered()
         for ordinal, offsets in _by_chunk(series):
             if ordinal in keep:
                 for head in _heads(file, index, ordinal, offsets, compressed=compressed):

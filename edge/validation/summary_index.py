@@ -89,6 +89,10 @@ class SummaryIndex(Gather):
     def _read_indexes(self) -> int:
         """Returns the number of messages they tell of."""
         counted = 0
+        self.file.read_scattered()
+        self.file.expect(
+            (record.end, length) for record, length in self._spans if length and record.end < self.file.size
+        )
         for ordinal, (record, length) in enumerate(self._spans):
             block = self.file.read(record.end, length)
             at = 0
