@@ -11,6 +11,7 @@ from typing import ClassVar
 from textual.app import App, ComposeResult, SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
+from textual.worker import Worker, WorkerState
 
 from edge.control.messages import Request
 from ui.answers import NOT_SENT, answer, goodbye, noted, unanswered
@@ -33,6 +34,8 @@ from ui.widgets.dashboard import Dashboard
 DRAW_S = 0.5
 """Twice a second is as fast as numbers are read, and leaves room on a slow link."""
 NOTICE_S = 8.0
+RESTART_S = 2.0
+CONNECTION = "connection"
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,13 @@ class RecorderApp(App[str]):
         self._ready_to_draw = True
         self.draw()
         self.set_interval(DRAW_S, self.draw)
-        self.run_worker(self._connection.run(self.post_message), exit_on_error=False)
+        self._connect()
+
+    def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
+        """A connection that failed in a way it should not have is said, and made anew."""
+        if event.state is WorkerState.ERROR and event.worker.group == CONNECTION:
+            self.post_message(ConnectionLost(f"This screen has a fault: {event.worker.error!r}"))
+            self.set_timer(RESTART_S, self._connect)
 
     def on_connected(self, _: Connected) -> None:
         self._situation = replace(self._situation, link=Link.ONLINE, link_problem="")
@@ -239,6 +248,9 @@ class RecorderApp(App[str]):
         yield SystemCommand("Bell", "Ring on a new fault, or not", self.action_toggle_bell)
         yield SystemCommand("Help", "Keys, symbols and words", self.action_help)
         yield SystemCommand("Quit", "Leave this screen; a recording goes on", self.action_quit)
+
+    def _connect(self) -> None:
+        self.run_worker(self._connection.run(self.post_message), group=CONNECTION, exit_on_error=False)
 
     def _can_mark(self) -> bool:
         recording = self._situation.state == "recording"

@@ -6,7 +6,7 @@ from ui.pieces import Pieces, badge
 from ui.tone import Tone
 
 KEYS = (
-    ("SPACE  R", "start recording; twice within 3 s: stop. A tap on the banner does the same"),
+    ("SPACE  R", "start; twice within 3 s: stop. So does a tap on the banner"),
     ("M", "mark this moment"),
     ("N", "mark this moment, with a few words"),
     ("V", "the verdict on the last recording, in full"),
@@ -17,7 +17,7 @@ KEYS = (
 )
 STATES = (
     (Tone.GOOD, "OK", "delivers what it should"),
-    (Tone.WARN, "SEARCHING", "not found yet. Switched on? Cable, Wi-Fi? While recording: red"),
+    (Tone.WARN, "SEARCHING", "not found. Switched on? Cable? Wi-Fi? Red in a recording"),
     (Tone.WARN, "STARTING", "found, not delivering yet. Wait a little"),
     (Tone.WARN, "DEGRADED", "delivers, with losses or poor quality: read its line"),
     (Tone.BAD, "FAILED", "refuses or is broken: do what its line says"),
@@ -25,12 +25,12 @@ STATES = (
 WORDS = (
     ("Green banner", "recording, all good"),
     ("Yellow banner", "recording, something to look at"),
-    ("Red banner", "recording with a hole in it, or no contact with the recorder"),
+    ("Red banner", "recording with a hole in it, or no contact"),
     ("Plain banner", "NOT recording"),
-    ("RATE", "messages a second; the bars are the last seconds, two thirds up is right"),
-    ("LOST GAP", "losses since the sensor started; longest silence just now"),
-    ("CLOCK", "how well the sensor's clock is known; a warning from 5 ms on"),
-    ("QUEUE", "what waits for the card. It fills when the card is slow; full means losses"),
+    ("HZ  TREND", "messages a second; bars: the last seconds, half up is right"),
+    ("LOST GAP", "lost since the sensor started; longest silence just now"),
+    ("CLOCK", "how well the sensor's clock is known; from 5 ms a warning"),
+    ("QUEUE", "what waits for the card. Fills when it is slow; full: losses"),
 )
 
 
@@ -47,5 +47,5 @@ def help_lines() -> tuple[Pieces, ...]:
         (("WORDS", "bold underline"),),
         *(((f"{word:<15}", "bold"), (text, "")) for word, text in WORDS),
         blank,
-        (("The recorder works on its own. Closing this screen, or losing the connection, stops nothing.", "bold"),),
+        (("The recorder works on its own: leaving this screen, or losing it, stops nothing.", "bold"),),
     )

@@ -1,15 +1,16 @@
-"""Pictures of the screen for the documentation: `python -m ui.screenshots OUTDIR`.
+"""Pictures of the screen for the documentation: `python -m ui.screenshots OUTDIR [--png]`.
 
-Each state becomes `tui-<state>.svg`, and a PNG beside it where cairosvg is installed.
+Each state becomes `tui-<state>.svg`; with `--png` also a PNG, through cairosvg.
 """
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import importlib
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -108,30 +109,26 @@ def local_font(svg: str) -> str:
     return svg.replace("font-size: 20px", f"font-size: {FONT_PX}px")
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Write every scene to the folder named in `arguments`."""
-    if len(arguments) != 1:
-        sys.stderr.write("usage: python -m ui.screenshots OUTDIR\n")
-        return 2
-    folder = Path(arguments[0])
-    folder.mkdir(parents=True, exist_ok=True)
-    to_png = _png_renderer()
+    parser = argparse.ArgumentParser(prog="python -m ui.screenshots", description="Draw the screen in all its states.")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--png", action="store_true", help="PNGs too; needs cairosvg and the font DejaVu Sans Mono")
+    options = parser.parse_args(arguments)
+    options.folder.mkdir(parents=True, exist_ok=True)
     for name, scene in SCENES.items():
-        svg = asyncio.run(shoot(scene))
-        (folder / f"tui-{name}.svg").write_text(svg, encoding="utf-8")
-        if to_png is not None:
-            to_png(bytestring=svg.encode(), write_to=str(folder / f"tui-{name}.png"), scale=PNG_SCALE)
+        target = options.folder / f"tui-{name}.svg"
+        target.write_text(asyncio.run(shoot(scene)), encoding="utf-8")
+        if options.png:
+            _to_png(target)
     return 0
 
 
-def _png_renderer() -> Callable[..., object] | None:
-    """cairosvg is a tool of development; without it there are the SVGs."""
-    try:
-        renderer: Callable[..., object] = importlib.import_module("cairosvg").svg2png
-    except ImportError:
-        return None
-    return renderer
+def _to_png(svg: Path) -> None:
+    # A tool of development, not a dependency of the program: imported here, and by name.
+    cairosvg = importlib.import_module("cairosvg")
+    cairosvg.svg2png(url=str(svg), write_to=str(svg.with_suffix(".png")), scale=PNG_SCALE)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

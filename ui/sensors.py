@@ -51,7 +51,7 @@ def header(widths: Columns) -> Pieces:
         "STATE".ljust(widths.state),
         "STREAM".ljust(widths.stream),
         "  HZ / NOMINAL".ljust(widths.rate),
-        fit("LAST SECONDS" if widths.spark > 12 else "TREND", widths.spark).ljust(widths.spark),
+        fit("LAST SECONDS" if widths.spark > 12 else "TREND", widths.spark).rjust(widths.spark),
         "LOST".rjust(widths.lost) if widths.lost else "",
         "GAP".rjust(widths.gap) if widths.gap else "",
         "CLOCK".rjust(widths.clock) if widths.clock else "",

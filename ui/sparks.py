@@ -11,7 +11,7 @@ BARS = "▁▂▃▄▅▆▇"
 def sparkline(ratios: Sequence[float], width: int) -> str:
     """The last `width` ratios of measured to expected, right-aligned, one bar each.
 
-    1 is two thirds up, so that too much shows as well as too little; nothing received is the base line.
+    1 is half up, so that too much shows as well as too little; nothing received is the base line.
     """
     shown = ratios[-width:] if width > 0 else ()
     return "".join(_bar(ratio) for ratio in shown).rjust(max(width, 0))

@@ -174,6 +174,15 @@ async def test_it_recovers_when_the_recorder_comes_back():
         assert not any(line.has_class("-stale") for line in op.app.query("SensorTable Line") if line.display)
 
 
+async def test_a_fault_in_the_connection_is_said_and_the_screen_lives_on(monkeypatch):
+    async def broken(self, post):
+        raise KeyError("oops")
+
+    monkeypatch.setattr(Recorder, "run", broken)
+    async with operator(samples.GOOD) as op:
+        assert "This screen has a fault: KeyError('oops')" in op.sees()
+
+
 async def test_a_silent_recorder_is_noticed():
     async with operator(samples.GOOD) as op:
         op.recorder.now_s += 5

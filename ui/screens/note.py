@@ -17,8 +17,9 @@ class NoteScreen(ModalScreen[str | None]):
     DEFAULT_CSS = """
     NoteScreen {
         align: center middle; background: $background 60%;
-        Vertical { width: 90%; max-width: 72; height: auto; padding: 1 2; background: $panel; border: thick $accent; }
-        Input { margin: 1 0; }
+        Vertical { width: 90%; max-width: 72; height: auto; padding: 1 2; background: $quiet; color: $on-quiet; }
+        Input { margin: 1 0; border: none; height: 1; padding: 0 1; }
+        Input:focus { border: none; }
     }
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "dismiss(None)", "Set no mark")]

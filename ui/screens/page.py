@@ -20,13 +20,13 @@ class PageScreen(ModalScreen[None]):
     DEFAULT_CSS = """
     PageScreen {
         background: $background;
-        VerticalScroll { padding: 1 2; scrollbar-size-vertical: 1; }
+        VerticalScroll { padding: 0 1; scrollbar-size-vertical: 1; }
         Line { height: auto; text-wrap: wrap; }
     }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape,q,h,question_mark,v,enter", "dismiss", "Back", key_display="Esc"),
-        Binding("down,j", "page(1)", "Down", key_display="↓", show=False),
+        Binding("escape,q,h,question_mark,v,enter", "dismiss", "Back", key_display="ESC"),
+        Binding("down,j", "page(1)", "Scroll", key_display="ARROWS"),
         Binding("up,k", "page(-1)", "Up", show=False),
     ]
 

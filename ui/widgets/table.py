@@ -8,7 +8,7 @@ from textual.app import ComposeResult
 from textual.containers import VerticalScroll
 
 from ui.history import History
-from ui.pieces import Pieces
+from ui.pieces import Pieces, plain
 from ui.sensors import columns, header, rows
 from ui.situation import Situation
 from ui.vitals import gnss_line
@@ -16,6 +16,9 @@ from ui.widgets.line import Line
 
 ROWS = 24
 """Made in advance: three sensors with all that can be wrong with them. More are added when needed."""
+
+TALL = 32
+"""A screen with this many rows has room for an empty one between the sensors, whatever is wrong with them."""
 
 
 class SensorTable(VerticalScroll, can_focus=False):
@@ -52,5 +55,7 @@ class SensorTable(VerticalScroll, can_focus=False):
         status = situation.status
         lines = [gnss_line(status.gnss if status else None), header(widths)]
         for sensor in status.sensors if status else ():
+            if self.app.size.height >= TALL:
+                lines.append(plain(""))
             lines.extend(rows(sensor, history, widths, situation.state == "recording"))
         return lines

@@ -1,0 +1,66 @@
+"""`mapforest tui`: options in, the last word out, and nothing of it in the service."""
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from edge.cli import exit_codes, tui
+from edge.errors import UsageError
+
+
+def arguments(*words):
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--config", type=Path, default=None)
+    parser.add_argument("--json", action="store_true")
+    tui.add_arguments(parser)
+    return parser.parse_args(words)
+
+
+@pytest.fixture
+def terminal(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    calls = []
+
+    def run(socket_path, **options):
+        calls.append((socket_path, options))
+        return "The recording goes on."
+
+    monkeypatch.setattr("ui.command.run", run)
+    return calls
+
+
+def test_options_reach_the_screen_and_its_last_word_is_printed(terminal, shown, capsys):
+    assert tui.run(arguments("--socket", "/x/s", "--sun", "--bell")) == exit_codes.GOOD
+    assert shown == [(Path("/x/s"), {"sun": True, "bell": True, "ascii_only": False})]
+    assert capsys.readouterr().out == "The recording goes on.\n"
+
+
+def test_the_socket_of_the_configuration_is_the_default(terminal, shown, tmp_path):
+    config = tmp_path / "mapforest.toml"
+    config.write_text(f'[control]\nsocket = "{tmp_path}/c.sock"\n')
+    tui.run(arguments("--config", str(config)))
+    assert shown[0][0] == tmp_path / "c.sock"
+
+
+@pytest.mark.parametrize("words", [(), ("--json",)])
+def test_without_a_terminal_it_names_the_command_for_programs(words):
+    with pytest.raises(UsageError, match="status --json"):
+        tui.run(arguments(*words))
+
+
+def test_the_command_table_and_the_service_never_load_textual():
+    code = (
+        "import sys, importlib, pkgutil, edge.cli.tui, edge.service;"
+        "[importlib.import_module(m.name) for m in pkgutil.iter_modules(edge.service.__path__, 'edge.service.')];"
+        "print([name for name in ('textual', 'ui') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.strip() == "[]"
