@@ -30,9 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ascii", action="store_true", help="plain characters, for terminals without the symbols")
 
 
+def has_terminal() -> bool:
+    """Whether there is a keyboard to read and a screen to draw on."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
 def run(args: argparse.Namespace) -> int:
     """Show the screen until the operator leaves it. A recording goes on."""
-    if args.json or not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if args.json or not has_terminal():
         raise UsageError("the screen needs a terminal; for programs there is `mapforest status --json`")
     socket_path: Path = args.socket or find_control_socket(load(args.config))
     module, _, name = APP.partition(":")

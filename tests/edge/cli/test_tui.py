@@ -20,9 +20,8 @@ def arguments(*words):
 
 
 @pytest.fixture
-def terminal(monkeypatch, capsys):
-    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+def terminal(monkeypatch):
+    monkeypatch.setattr(tui, "has_terminal", lambda: True)
 
 
 @pytest.fixture
