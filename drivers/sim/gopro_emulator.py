@@ -31,7 +31,6 @@ LATENCY_S = 0.12
 """From exposure to the first datagram. A real HERO8 needs 0.5 s and more."""
 AHEAD = 15
 """Frames made ahead of their time."""
-LATE_S = 0.5
 TRUTH_EVERY = 3
 AUDIO_TICKS = 1920
 """1024 samples at 48 kHz, in 90 kHz ticks."""
@@ -159,6 +158,9 @@ class Emulator:
     def _make(self) -> None:
         index = 0
         while not self._stopping.is_set():
+            # A camera that cannot keep up leaves frames out; it does not fall behind.
+            due = int((self._t_s() - LATENCY_S) * 1e9) * FRAME_NS[1] // FRAME_NS[0]
+            index = max(index, due)
             frame = (index, self._source.access_unit(index)[0])
             index += 1
             while not self._stopping.is_set():
@@ -193,10 +195,7 @@ class Emulator:
             truth.write(json.dumps({"host_ns": self._epoch_ns + t_ns, "sensor_ns": sensor_ns}) + "\n")
             truth.flush()
         self._due_s = max(self._due_s, self._epoch_ns / 1e9 + t_s + LATENCY_S + self._line.delay_s(t_s))
-        late_s = time.monotonic() - self._due_s
-        if late_s > LATE_S and not self._frames.empty():  # catching up after a slow start: the camera drops
-            return
-        self._stopping.wait(max(0.0, -late_s))
+        self._stopping.wait(max(0.0, self._due_s - time.monotonic()))
         self._stream(index, unit, sensor_ns * 9 // 100_000, t_s)
 
     def _stream(self, index: int, unit: bytes, pts: int, t_s: float) -> None:

@@ -64,7 +64,8 @@ class GnssSource(Protocol):
 
 
 class VideoSource(Protocol):
-    """Films. Frame k is exposed at k * 1001/30000 s of walk time; called with k = 0, 1, 2, ..."""
+    """Films. Frame k is exposed at k * 1001/30000 s of walk time; called with increasing k, which leaves out
+    what could not be filmed in time."""
 
     def access_unit(self, index: int) -> tuple[bytes, bool]:
         """H.264 access unit in Annex B, and whether it is a keyframe (then SPS and PPS are in it)."""

@@ -25,18 +25,18 @@ class Pictures(Protocol):
 
 
 class RenderedVideo:
-    """A `VideoSource`: every frame is rendered when it is asked for, in order, and encoded without delay."""
+    """A `VideoSource`: a frame is rendered when it is asked for, in order, and encoded without delay."""
 
     def __init__(self, renderer: Pictures, width_px: int, height_px: int) -> None:
         self._renderer = renderer
         self._encoder = _encoder(width_px, height_px)
-        self._next = 0
+        self._last = -1
 
     def access_unit(self, index: int) -> tuple[bytes, bool]:
         """Annex B, SPS and PPS before each keyframe. SimulationError when frames are asked for out of order."""
-        if index != self._next:
-            raise SimulationError(f"video frame {index} asked for after {self._next - 1}: frames are made in order")
-        self._next += 1
+        if index <= self._last:
+            raise SimulationError(f"video frame {index} asked for after {self._last}: frames are made in order")
+        self._last = index
         rgb = self._renderer.render(exposure_ns(index))
         planes = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2YUV_I420), dtype=np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")

@@ -35,6 +35,6 @@ def test_keyframes_come_every_second_with_their_parameter_sets():
 
 def test_frames_out_of_order_are_refused():
     video = RenderedVideo(Ramp(), 64, 48)
-    video.access_unit(0)
+    video.access_unit(5)
     with pytest.raises(SimulationError, match="in order"):
-        video.access_unit(2)
+        video.access_unit(4)
