@@ -38,6 +38,8 @@ class Recording:
         """Index every file. FormatError when there is nothing to index."""
         paths = recording_files(targets)
         files, unreadable = _read_all(paths)
+        given_up = [path.name for target in targets if target.is_dir() for path in target.glob("*.damaged")]
+        unreadable |= dict.fromkeys(given_up, "the repair after a power cut found nothing in it that can be used")
         topics: dict[str, Topic] = {}
         conflicts = set()
         for name, topic in (item for index in files for item in index.topics.items()):

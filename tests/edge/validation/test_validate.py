@@ -210,3 +210,11 @@ def test_clear_refusals(tmp_path):
     write_session(tmp_path / "b.mcap", session=OURS)
     report = validate(tmp_path)
     assert "a.mcap cannot be read" in report.reasons[0]
+
+
+def test_a_part_given_up_by_the_repair_fails(tmp_path):
+    write_session(tmp_path / "walk_0.mcap", session=OURS)
+    (tmp_path / "walk_1.mcap.damaged").write_bytes(b"?")
+    report = validate(tmp_path)
+    assert report.verdict == "FAIL"
+    assert "walk_1.mcap.damaged cannot be read" in report.reasons[0]
