@@ -57,6 +57,8 @@ class DriverRunner:
 
     def join(self, timeout_s: float) -> None:
         """Wait for the driver's polite goodbye, but not for ever."""
+        if self._thread.ident is None:
+            return  # never started: the service failed before
         self._thread.join(timeout_s)
         if self._thread.is_alive():
             log.warning("driver %s does not end; leaving it behind", self.name)

@@ -132,3 +132,17 @@ def test_a_killed_recorder_leaves_a_socket_that_stops_nobody(
     assert path.exists()
     with pytest.raises(ControlError, match="not running"):
         ControlClient(path).status()
+
+
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("edge.service.service", ["numba", "cv2", "av", "scipy", "textual", "rich", "foxglove", "edge.validation"]),
+        ("edge.cli.start", ["numpy", "mcap", "textual", "rich", "edge.service"]),
+        ("edge.cli.status", ["numpy", "mcap", "textual", "rich", "edge.service"]),
+    ],
+)
+def test_nothing_is_loaded_that_is_not_needed(module: str, heavy: list[str]) -> None:
+    script = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"

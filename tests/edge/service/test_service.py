@@ -238,6 +238,25 @@ def test_leftovers_of_a_power_cut_are_repaired_at_the_start(tmp_path: Path, serv
         wait_for(split.exists)
 
 
+def test_the_watchdog_is_fed_while_a_slow_card_finishes_the_last_session(
+    service: Service, notifier: FakeNotifier, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service._recorder.repaired.set()
+    service.handle(Request("start"), 0)
+    finish = service._recorder.stop
+    monkeypatch.setattr("edge.service.service.TICK_S", 0.01)
+    monkeypatch.setattr("edge.service.service.LOOK_NS", 1)
+
+    def stop_slowly(reason: str) -> None:
+        wait_for(lambda: notifier.pings >= 3)
+        finish(reason)
+
+    service._recorder.stop = stop_slowly  # type: ignore[method-assign]
+    service._shut_down()
+    assert notifier.pings >= 3
+    assert service._recorder.state == "idle"
+
+
 def test_a_second_recorder_is_refused(client: ControlClient, tmp_path: Path) -> None:
     with pytest.raises(ControlError, match="another recorder is running"):
         Service(config(tmp_path), plans=[]).run(threading.Event())
