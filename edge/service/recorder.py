@@ -107,6 +107,12 @@ class Recorder:
         with self._lock:
             self._stop(reason)
 
+    def tell(self, problem: str) -> None:
+        """Show the operator what happened before this service came up, until the next start."""
+        # Without the lock: a start that waits for the repair holds it, and clears the problem anyway.
+        if self._session is None:
+            self.problem = problem
+
     def _start(self, request: Request) -> None:
         if self._session is not None:
             return

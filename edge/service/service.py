@@ -136,16 +136,13 @@ class Service:
         """Thread root."""
         try:
             for repair in repair_leftovers(recordings_folder(self._config)):
-                log.warning(
-                    "session %s was cut off; %s: %d messages kept, %d bytes lost %s",
-                    repair.session,
-                    repair.file,
-                    repair.messages,
-                    repair.lost_bytes,
-                    repair.error,
-                )
+                text = f"session {repair.session} was cut off (power or kill)"
                 if repair.error:
-                    self._health.notices.append(f"session {repair.session} was cut off: {repair.error}")
+                    self._health.notices.append(f"{text}: {repair.error}")
+                else:
+                    text = f"{text} and repaired, {repair.messages} messages kept, {repair.lost_bytes} bytes lost"
+                    self._recorder.tell(f"{text}; it is not being recorded any more, start again if you need to")
+                log.warning("%s %s", text, repair.error)
         except Exception as error:  # the thread's root: an odd file must not keep the payload from recording
             log.exception("repair failed")
             self._health.notices.append(f"old recordings could not be put in order ({error}); see the log")

@@ -234,8 +234,12 @@ def test_leftovers_of_a_power_cut_are_repaired_at_the_start(tmp_path: Path, serv
     data = split.read_bytes()
     split.unlink()
     split.with_suffix(".mcap.active").write_bytes(data[: len(data) - 40])
-    with running(Service(config(tmp_path), plans=[]), tmp_path / "control.sock"):
+    with running(Service(config(tmp_path), plans=[]), tmp_path / "control.sock") as client:
         wait_for(split.exists)
+        wait_for(lambda: client.status().problems)
+        assert f"session {folder.name} was cut off (power or kill) and repaired" in client.status().problems[0]
+        client.request(Request("start"))
+        assert client.status().problems == ()
 
 
 def test_the_watchdog_is_fed_while_a_slow_card_finishes_the_last_session(
