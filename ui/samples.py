@@ -56,8 +56,8 @@ HOST = Host(34.0, 41.0, 61.0, False, 41_200_000_000, 7920.0, 5100.0, 0.03, True,
 GNSS = Gnss(5, "RTK float", 14, 0.21, 0.38, 0.1)
 RECORDING = Recording(SESSION, f"/recordings/{SESSION}", "north-slope", 754.0, 2_860_000_000, 207_332, 0, 3, 11.0, 12)
 REASONS = (
-    "/camera/video stops 41 s before the end: the camera's battery was empty.",
-    "/gnss/fix has no fix in 58 % of its epochs, longest 31 s at 0:07:12.",
+    "The camera stopped 41 s before the end (/camera/video). Charge its battery and keep a second one at hand.",
+    "The GNSS receiver had a fix in 42 % of its epochs only. Let it stand in the open for a minute at the start.",
     "/livox/lidar lost 212 packets (0.02 %), largest gap 0.3 s at 0:04:50.",
     "/gnss/nmea lost 158 sentences between 0:09:01 and 0:09:40.",
 )

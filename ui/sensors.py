@@ -63,7 +63,7 @@ def rows(sensor: Sensor, history: History, widths: Columns, recording: bool) -> 
     """The table's lines for one sensor."""
     tone = sensor_tone(sensor, recording)
     leads = (badge(sensor.state.upper(), tone, widths.state - 1), extras(sensor))
-    streams = tuple(_stream(stream, history.of(sensor.name, stream.name), widths) for stream in sensor.streams)
+    streams = tuple(_stream(stream, history.of(sensor.name, stream.name), widths) for stream in shown_streams(sensor))
     clocks = (_clock(sensor.clock, widths.clock),) if sensor.streams else ()
     lines = [
         (*_name(sensor.name if index == 0 else "", widths), *_filled(lead, widths.state), *stream, *clock)
@@ -75,6 +75,11 @@ def rows(sensor: Sensor, history: History, widths: Columns, recording: bool) -> 
     if sensor.advice:
         lines.append(((f"→ {sensor.advice}", ""),))
     return tuple(lines)
+
+
+def shown_streams(sensor: Sensor) -> tuple[Stream, ...]:
+    """All of them; of a sensor that sends nothing the first, since its line on what to do needs the room."""
+    return sensor.streams if any(stream.rate_hz > 0 for stream in sensor.streams) else sensor.streams[:1]
 
 
 def extras(sensor: Sensor) -> Pieces:

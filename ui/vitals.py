@@ -89,4 +89,4 @@ def _temperature(host: Host) -> Vital:
 def _clock(host: Host) -> Vital:
     if host.clock_synchronised:
         return Vital("CLOCK", fit(host.clock_source or "set", 7), Tone.GOOD)
-    return Vital("CLOCK", "not set", Tone.WARN)
+    return Vital("CLOCK", "no sync", Tone.WARN)

@@ -114,6 +114,14 @@ def test_a_problem_is_followed_by_what_to_do():
     assert "▲ bat 4%" in lines[1]
 
 
+def test_a_sensor_that_sends_nothing_takes_one_row_for_its_streams():
+    silent = tuple(changed(stream, rate_hz=0.0) for stream in samples.livox().streams)
+    sensor = samples.livox(state="searching", streams=silent, temperature_c=None, problem="gone", advice="look")
+    lines = [text_of(line) for line in rows(sensor, History(), columns(77), True)]
+    assert len(lines) == 3
+    assert lines[1:] == ["✗ gone", "→ look"]
+
+
 def test_a_sensor_that_sends_nothing_still_has_its_row():
     sensor = samples.livox(state="searching", streams=(), clock=None, temperature_c=None)
     assert [text_of(line).split() for line in rows(sensor, History(), columns(77), False)] == [
@@ -194,7 +202,7 @@ def test_vitals_warn_with_a_symbol():
     assert shown["CARD LEFT"] == "▲ 11m"
     assert shown["QUEUE"] == "▲ 56 %"
     assert shown["THROTTLED"] == "▲ 88 °C"
-    assert shown["CLOCK"] == "▲ not set"
+    assert shown["CLOCK"] == "▲ no sync"
     assert [vital.label for vital in vitals(None)] == list(LABELS)
 
 

@@ -11,8 +11,8 @@ from ui.situation import Situation
 from ui.verdict import verdict_lines
 from ui.widgets.line import Line
 
-REASONS = 3
-"""As many as leave the sensors visible on 24 rows."""
+REASONS = 2
+"""Two lines each, with what to do: as many as leave the sensors visible on 24 rows."""
 
 
 class VerdictPanel(Vertical):
@@ -20,6 +20,7 @@ class VerdictPanel(Vertical):
 
     DEFAULT_CSS = """
     VerdictPanel { height: auto; margin: 1 1 0 1; display: none; }
+    VerdictPanel Line { height: auto; text-wrap: wrap; }
     """
 
     def __init__(self) -> None:
