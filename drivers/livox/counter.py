@@ -40,6 +40,8 @@ class PacketCounter:
         self._period_ns = period_ns
         self._last: _Arrival | None = None
         self._odd: _Arrival | None = None
+        self._left: _Arrival | None = None
+        """Last packet before the last jump: stragglers of that line must not be taken for a jump back."""
         self._missing: OrderedDict[int, None] = OrderedDict()
         self.received = 0
         self.lost = 0
@@ -87,6 +89,9 @@ class PacketCounter:
         return abs(packets - elapsed_ns / self._period_ns) <= 64 + packets // 1000
 
     def _judge_odd(self, arrival: _Arrival) -> Verdict:
+        if self._left is not None and _same_line(self._left, arrival):
+            self.odd += 1
+            return Verdict.ODD
         odd, last = self._odd, self._last
         self._odd = arrival
         if odd is None or last is None or self._packets_between(odd, arrival) not in range(1, LATE + 1):
@@ -98,6 +103,7 @@ class PacketCounter:
         else:
             self.restarts += 1
         self._missing.clear()
+        self._left = last
         self._accept(arrival)
         return Verdict.JUMPED
 
@@ -125,3 +131,10 @@ class PacketCounter:
             self._missing[(last_count + ahead) % WRAP] = None
         while len(self._missing) > LATE:
             self._missing.popitem(last=False)
+
+
+def _same_line(left: _Arrival, straggler: _Arrival) -> bool:
+    """Whether a packet belongs to a line of time that was left less than a second ago."""
+    behind = min((straggler.number - left.number) % WRAP, (left.number - straggler.number) % WRAP)
+    apart_ns = max(abs(straggler.sensor_ns - left.sensor_ns), abs(straggler.receive_ns - left.receive_ns))
+    return behind <= LATE and apart_ns < JUMP_NS

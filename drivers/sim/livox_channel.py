@@ -14,6 +14,8 @@ from drivers.sim.faults import FaultPlan
 
 Destination: TypeAlias = tuple[str, int]
 LONGEST_GARBAGE = 1500
+AT_ONCE_NS = 500_000
+"""The emulator cannot wait for less than a millisecond; shorter delays are none, lest all packets come that late."""
 
 
 @dataclass
@@ -121,12 +123,13 @@ class Channel:
             deliver(self._random.choice(sockets), garbage, self._random.choice(to))
 
     def _pass(self, via: socket.socket, packet: Buffer, to: Destination, now_ns: int) -> None:
-        if not self.levels.delay_s:
+        mean_s = self.levels.delay_s
+        delay_ns = round(self._random.expovariate(1.0 / mean_s) * 1e9) if mean_s else 0
+        if delay_ns < AT_ONCE_NS:
             deliver(via, packet, to)
             return
         self._order += 1
-        due_ns = now_ns + round(self._random.expovariate(1.0 / self.levels.delay_s) * 1e9)
-        heapq.heappush(self._late, (due_ns, self._order, via, packet, to))
+        heapq.heappush(self._late, (now_ns + delay_ns, self._order, via, packet, to))
 
     def _flipped(self, packet: Buffer) -> bytes:
         damaged = bytearray(packet)

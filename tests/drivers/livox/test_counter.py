@@ -80,6 +80,15 @@ def test_clock_jump_is_told_from_a_restart():
         assert (counter.restarts, counter.jumps, counter.lost) == (0, 1, 0)
 
 
+def test_stragglers_from_before_a_jump_are_no_jump_back():
+    counter = counted([0, 1, 2])
+    jumped = [(count, sensor_ns + 3 * 10**9, receive_ns) for count, sensor_ns, receive_ns in map(packet, (6, 7, 8, 9))]
+    verdicts = [counter.take(*each) for each in (*jumped[:2], packet(3), packet(4), packet(5), *jumped[2:])]
+    odd, new = Verdict.ODD, Verdict.NEW
+    assert verdicts == [odd, Verdict.JUMPED, odd, odd, odd, new, new]
+    assert counter.jumps == 1
+
+
 def test_one_damaged_packet_changes_nothing_but_its_own_loss():
     for damaged in ((30_000, *packet(3)[1:]), (3, 10**15, packet(3)[2]), (3, 0, packet(3)[2])):
         counter = counted([0, 1, 2])
