@@ -68,10 +68,11 @@ class Source:
 
 
 class Receiver:
-    """Receives from one LiDAR on any number of ports. `blocks()` hands over to the decoding thread."""
+    """Receives from one LiDAR on any number of ports. `take()` hands over to the decoding thread."""
 
     def __init__(self) -> None:
         self._sources: list[Source] = []
+        self._hosts: set[str] = set()
         self._free: deque[Block] = deque(Block() for _ in range(BLOCKS))
         self._filled: deque[Block] = deque()
         self._block = self._free.pop()
@@ -81,16 +82,25 @@ class Receiver:
         """Datagrams from somebody else."""
 
     def open(self, host: str, ports: tuple[int, ...], buffer_bytes: int) -> None:
-        """Bind, once. SensorUnreachable when this host does not have the address (yet), or a port is taken."""
-        if self._sources:
+        """Bind, once a host address: never to any address, which would shut out other programs on this host.
+
+        SensorUnreachable when this host does not have the address (yet), or a port is taken.
+        """
+        if host in self._hosts:
             return
+        opened: list[Source] = []
         try:
-            self._sources = [_bind(host, port, buffer_bytes) for port in dict.fromkeys(ports)]
+            for port in dict.fromkeys(ports):
+                opened.append(_bind(host, port, buffer_bytes))
         except OSError as error:
+            for source in opened:
+                source.socket.close()
             raise SensorUnreachable(
-                f"cannot receive on {host or 'any address'}, UDP ports {ports}: {error.strerror or error}; "
+                f"cannot receive on {host}, UDP ports {ports}: {error.strerror or error}; "
                 "check host_address and whether another program uses these ports"
             ) from error
+        self._sources = [*self._sources, *opened]
+        self._hosts.add(host)
 
     def accept_from(self, address: str) -> None:
         """Take datagrams of this LiDAR only."""
@@ -116,6 +126,7 @@ class Receiver:
         for source in self._sources:
             source.socket.close()
         self._sources = []
+        self._hosts.clear()
 
     def wait(self, timeout_s: float) -> bool:
         """Whether datagrams came within the time."""

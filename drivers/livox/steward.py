@@ -95,21 +95,21 @@ class Steward:
     def _serve(self, stop: Event) -> None:
         """From searching to looking after; ends by an error, or with `stop`."""
         config = self._config
-        self._receiver.open(
-            config.host_address, (config.host_point_port, config.host_imu_port), config.receive_buffer_bytes
-        )
         with contextlib.closing(StatusListener(config)) as listener:
             found = self._find(listener, stop)
             if found is None:
                 return
             self.address = found.address
+            host = config.host_address or _route_to(found.address)
+            ports = (config.host_point_port, config.host_imu_port)
+            self._receiver.open(host, ports, config.receive_buffer_bytes)
             self._receiver.accept_from(found.address)
-            with self._link(found) as link:
+            with self._link(found, host) as link:
                 self._identify(link, found)
-                self._configure(link)
+                self._configure(link, host)
                 self._connected_to(found)
-                self._watch(link, listener, stop)
-            with self._link(found, hurried=True) as link:
+                self._watch(link, host, listener, stop)
+            with self._link(found, host, hurried=True) as link:
                 self._leave(link)
 
     def _find(self, listener: StatusListener, stop: Event) -> Found | None:
@@ -126,11 +126,10 @@ class Steward:
             self._fall(SensorState.SEARCHING, SensorUnreachable(f"no Livox LiDAR{wanted} answers or is heard"))
         return None
 
-    def _link(self, found: Found, hurried: bool = False) -> ControlLink:
+    def _link(self, found: Found, host: str, hurried: bool = False) -> ControlLink:
         config = self._config
         timeout_s, attempts = (STOP_TIMEOUT_S, 2) if hurried else (config.reply_timeout_s, config.attempts)
-        host = (config.host_address, config.host_command_port)
-        return ControlLink(host, (found.address, found.command_port), timeout_s, attempts)
+        return ControlLink((host, config.host_command_port), (found.address, found.command_port), timeout_s, attempts)
 
     def _identify(self, link: ControlLink, found: Found) -> None:
         """Refuse what this driver does not speak to."""
@@ -150,14 +149,13 @@ class Steward:
                 f"the LiDAR at {found.address} is {self.identity.serial}, and {wanted} is configured"
             )
 
-    def _configure(self, link: ControlLink) -> None:
+    def _configure(self, link: ControlLink, host: str) -> None:
         """Point the streams to this host in one frame, then what to send and to start.
 
         Always rewritten: the LiDAR stores it, and another host may have changed it.
         """
         self._configure_again.clear()
         config = self._config
-        host = config.host_address or _route_to(self.address)
         destinations: dict[int, Value] = {
             Key.STATUS_HOST: Endpoint(host, config.host_status_port, config.status_source_port),
             Key.POINT_HOST: Endpoint(host, config.host_point_port, config.point_source_port),
@@ -175,7 +173,7 @@ class Steward:
         self._configured_ns = self._status_ns = time.monotonic_ns()
         self.state, self.problem, self.advice = SensorState.STARTING, "", ""
 
-    def _watch(self, link: ControlLink, listener: StatusListener, stop: Event) -> None:
+    def _watch(self, link: ControlLink, host: str, listener: StatusListener, stop: Event) -> None:
         """Follow the status; configure again after a restart or when the data do not come."""
         while not stop.is_set():
             select.select(listener.sockets, [], [], 0.2)
@@ -185,10 +183,10 @@ class Steward:
             if self.status_age_s() > PUSH_OVERDUE_S:
                 self._heard(read_status(link.read(STATUS_KEYS)))
             if self._configure_again.is_set():
-                self._configure(link)
-            self._mind_silence(link)
+                self._configure(link, host)
+            self._mind_silence(link, host)
 
-    def _mind_silence(self, link: ControlLink) -> None:
+    def _mind_silence(self, link: ControlLink, host: str) -> None:
         data_ns = self._last_data_ns() or 0
         starting = self.status is None or self.status.work_state in STARTING_STATES
         patience_s = self._config.start_timeout_s if starting else self._config.silence_s
@@ -196,7 +194,7 @@ class Steward:
             if data_ns > self._configured_ns or not self._repeated:
                 self._note(Severity.WARNING, "the LiDAR answers but sends no points; configuring it again")
             self._repeated = data_ns <= self._configured_ns
-            self._configure(link)
+            self._configure(link, host)
 
     def _heard(self, status: Status) -> None:
         """Take a status in; a health code that is new is worth an event."""

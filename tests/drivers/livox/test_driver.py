@@ -1,11 +1,13 @@
 """The driver against the emulated LiDAR, end to end over UDP on loopback."""
 
+import random
 import time
 
 import numpy as np
 import pytest
 
 from drivers.driver import SensorState
+from drivers.livox.keys import Key
 from drivers.livox.status import WorkState
 from drivers.sim.livox_emulator import BROADCAST
 from tests.drivers.livox.rig import driving, emulated, quick, running, streaming
@@ -175,3 +177,14 @@ def test_lidar_sent_to_sleep_by_somebody_is_woken():
         emulator.device.machine.aim(WorkState.IDLE, time.monotonic_ns())
         wait_for(lambda: any("configuring it again" in text for text in rig.events), 10.0)
         streaming(rig, 2)
+
+
+def test_finds_its_own_address_by_the_route():
+    """The route to loopback is from 127.0.0.1; unusual ports keep out of the way of other programs there."""
+    first = random.SystemRandom().randrange(20_000, 30_000)
+    names = ("host_command_port", "host_status_port", "host_point_port", "host_imu_port")
+    ports = {name: first + 10 * at for at, name in enumerate(names)}
+    with emulated() as (emulator, lidar, _), driving(emulator, quick(lidar, "", ports)) as rig:
+        streaming(rig, 2)
+        host = emulator.device.setting(Key.POINT_HOST)
+    assert (host.address, host.port) == ("127.0.0.1", ports["host_point_port"])
