@@ -23,7 +23,7 @@ from edge.errors import ControlError, EdgeError
 
 UP_S = 60.0
 VERDICT_S = 60.0
-TAIL_S = 1.0
+TAIL_S = 4.0
 """Recorded at rest after the walk."""
 POLL_S = 0.5
 

@@ -16,29 +16,29 @@ from edge import __version__
 from edge.cli import exit_codes
 from edge.errors import EdgeError, UsageError
 
-COMMANDS: dict[str, str] = {
-    "demo": "edge.cli.demo",
-    "recorder": "edge.cli.recorder",
-    "tui": "edge.cli.tui",
-    "start": "edge.cli.start",
-    "stop": "edge.cli.stop",
-    "status": "edge.cli.status",
-    "mark": "edge.cli.mark",
-    "doctor": "edge.cli.doctor",
-    "validate": "edge.cli.validate",
-    "recover": "edge.cli.recover",
-    "info": "edge.cli.info",
-    "evaluate": "edge.cli.evaluate",
-    "sim": "edge.cli.sim",
+COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("edge.cli.demo", "the whole mission on the emulated payload"),
+    "recorder": ("edge.cli.recorder", "the service: sensors, files, health, control socket"),
+    "tui": ("edge.cli.tui", "the operator's screen: start, stop and mark with one key each"),
+    "start": ("edge.cli.start", "start recording"),
+    "stop": ("edge.cli.stop", "stop recording and finish the session"),
+    "status": ("edge.cli.status", "what the recorder does and how the sensors are"),
+    "mark": ("edge.cli.mark", "write a note into the recording"),
+    "doctor": ("edge.cli.doctor", "preflight: sensors, clocks, card, permissions, calibration"),
+    "validate": ("edge.cli.validate", "judge a recording"),
+    "recover": ("edge.cli.recover", "copy everything sound out of a damaged recording"),
+    "info": ("edge.cli.info", "topics, types, counts and rates of a recording"),
+    "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
+    "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }
-"""command -> module with HELP, add_arguments and run. Import strings, so that `status` does not load numba."""
+"""command -> (module with HELP, add_arguments and run; summary). Import strings: `status` must not load numba."""
 
 
 class Command(Protocol):
     """What a command's module offers."""
 
     HELP: str
-    """One line, then an example."""
+    """What it does, then an example."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare the command's own options."""
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _load(name: str) -> Command:
-    return cast("Command", importlib.import_module(COMMANDS[name]))
+    return cast("Command", importlib.import_module(COMMANDS[name][0]))
 
 
 def _parser(chosen: str, command: Command | None) -> argparse.ArgumentParser:
@@ -72,21 +72,21 @@ def _parser(chosen: str, command: Command | None) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"mapforest {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    listed = COMMANDS if chosen not in COMMANDS else [chosen]
-    for name in listed:
-        text = (command if name == chosen and command else _load(name)).HELP
+    for name, (_, summary) in COMMANDS.items():
+        text = command.HELP if command is not None and name == chosen else None
         sub = commands.add_parser(
-            name,
-            help=text.splitlines()[0],
-            description=text,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            name, help=summary, description=text, formatter_class=argparse.RawDescriptionHelpFormatter
         )
-        sub.add_argument("--config", type=Path, default=_default_config(), metavar="FILE", help="TOML configuration")
-        sub.add_argument("--json", action="store_true", help="print JSON for programs")
-        sub.add_argument("--verbose", "-v", action="store_true", help="say more on standard error")
-        if name == chosen and command is not None:
+        if command is not None and name == chosen:
+            _add_common(sub)
             command.add_arguments(sub)
     return parser
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--config", type=Path, default=_default_config(), metavar="FILE", help="TOML configuration")
+    parser.add_argument("--json", action="store_true", help="print JSON for programs")
+    parser.add_argument("--verbose", "-v", action="store_true", help="say more on standard error")
 
 
 def _default_config() -> Path | None:

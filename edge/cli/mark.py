@@ -8,7 +8,7 @@ from edge.cli import exit_codes
 from edge.cli.asking import ask, print_reply
 from edge.control.messages import Request
 
-HELP = """Write a note into the recording, at this instant
+HELP = """write a note into the recording, at this instant
 
 example: mapforest mark "ailanthus left of the trail" """
 

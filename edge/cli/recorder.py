@@ -11,7 +11,7 @@ from edge.cli import exit_codes
 from edge.config import load
 from edge.service.service import Service
 
-HELP = """Run the recorder service: sensors, recording, control socket
+HELP = """run the recorder service: sensors, recording, control socket
 
 example: mapforest recorder --config /etc/mapforest/mapforest.toml
 It records when asked to (`mapforest start`, `mapforest tui`), and ends cleanly on Ctrl-C or SIGTERM."""

@@ -8,7 +8,7 @@ from edge.cli import exit_codes
 from edge.cli.asking import ask, print_reply
 from edge.control.messages import Request
 
-HELP = """Start recording
+HELP = """start recording
 
 example: mapforest start --mission "plot 7" --operator ada
 Starting while a recording runs changes nothing and names that recording."""

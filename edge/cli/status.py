@@ -14,7 +14,7 @@ from edge.cli.asking import connect
 from edge.control.client import ControlClient
 from edge.control.messages import Gnss, Host, Recording, Sensor, Status, Verdict
 
-HELP = """Show what the recorder does and how the sensors are
+HELP = """show what the recorder does and how the sensors are
 
 example: mapforest status --watch
 Ends with 0 when all is well, 3 when a sensor or the recorder has a problem."""

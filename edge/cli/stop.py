@@ -8,7 +8,7 @@ from edge.cli import exit_codes
 from edge.cli.asking import FINISHING_S, ask, print_reply
 from edge.control.messages import Request
 
-HELP = """Stop recording and finish the session on the card
+HELP = """stop recording and finish the session on the card
 
 example: mapforest stop
 Stopping when nothing is recorded changes nothing. The verdict on the recording comes with `mapforest status`."""

@@ -13,7 +13,7 @@ from edge.config import load
 from edge.errors import UsageError
 from edge.paths import find_control_socket
 
-HELP = """Watch the recorder; start, mark and stop with one key each.
+HELP = """watch the recorder; start, mark and stop with one key each.
 
 example: mapforest tui --sun --bell"""
 
