@@ -39,6 +39,8 @@ class StreamHealth:
     """Losses since the driver started, in the unit the sensor counts (packets, sentences, frames)."""
     largest_gap_s: float
     """Longest silence between two receptions since the last call."""
+    units: int = 0
+    """Received since the driver started, in the unit losses are counted in; 0: the same as `received`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,8 +60,17 @@ class Reporter:
         scans_hz, _ = decoder.scan_meter.read(now_ns)
         _, points_gap_s = decoder.point_meter.read(now_ns)
         imu_hz, imu_gap_s = decoder.imu_meter.read(now_ns)
+        points = decoder.points
         return (
-            StreamHealth("points", scans_hz, SCANS_HZ, decoder.scan_meter.total, decoder.points.lost, points_gap_s),
+            StreamHealth(
+                "points",
+                scans_hz,
+                SCANS_HZ,
+                decoder.scan_meter.total,
+                points.lost,
+                points_gap_s,
+                units=points.received,
+            ),
             StreamHealth("imu", imu_hz, IMU_HZ, decoder.imu_meter.total, decoder.imu.lost, imu_gap_s),
         )
 

@@ -71,6 +71,8 @@ class SplitSummary(msgspec.Struct, frozen=True, kw_only=True):
     """Events by severity."""
     marks: tuple[MarkNote, ...]
     flush_worst_ms: float
+    first_diagnostics: dict[str, DiagnosticNote] = {}
+    """First status of each part in this session: what a driver had lost before does not count against it."""
 
 
 class Written(msgspec.Struct, frozen=True):
@@ -91,6 +93,7 @@ class Tally:
         self.events: Counter[str] = Counter()
         self.marks: list[MarkNote] = []
         self.diagnostics: dict[str, DiagnosticNote] = {}
+        self.first_diagnostics: dict[str, DiagnosticNote] = {}
         self.clock_drift_ns = 0
         self.clock_steps = 0
         self.flush_worst_ms = 0.0
@@ -108,6 +111,7 @@ class Tally:
                 for status in message.statuses:
                     note = DiagnosticNote(int(status.level), status.message, dict(status.values))
                     self.diagnostics[status.name] = note
+                    self.first_diagnostics.setdefault(status.name, note)
             case _:
                 pass
 
@@ -131,6 +135,7 @@ class Tally:
             events=dict(self.events),
             marks=tuple(self.marks),
             flush_worst_ms=self.flush_worst_ms,
+            first_diagnostics=dict(self.first_diagnostics),
         )
 
 

@@ -52,6 +52,7 @@ def _sensor(health: SensorHealth) -> DiagnosticStatus:
             (f"{stream.name}.rate_hz", f"{stream.rate_hz:.2f}"),
             (f"{stream.name}.expected_hz", f"{stream.expected_hz:g}"),
             (f"{stream.name}.received", str(stream.received)),
+            (f"{stream.name}.units", str(stream.units or stream.received)),
             (f"{stream.name}.lost", str(stream.lost)),
             (f"{stream.name}.largest_gap_s", f"{stream.largest_gap_s:.3f}"),
         ]

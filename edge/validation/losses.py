@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from edge.validation.report import Finding, Level
-from edge.validation.told import Told
+from edge.validation.told import Note, Told
 
 _SENSOR = "sensor/"
-_LOST, _RECEIVED = ".lost", ".received"
+_LOST, _UNITS, _RECEIVED = ".lost", ".units", ".received"
 _WARN_SHARE, _FAIL_SHARE = 0.005, 0.1
 """Losses on the way from a sensor: odometry bears a few packets, not every tenth."""
 _DROP_FAIL_SHARE = 0.05
@@ -20,18 +20,30 @@ def dropped(said: Told | None) -> dict[str, int]:
 
 
 def lost(said: Told | None) -> dict[str, tuple[int, int]]:
-    """(lost, received) by "sensor stream" from the last diagnostics, since the driver started; where any were lost."""
+    """(lost, received) by "sensor stream" during the session, by the diagnostics; where any were lost.
+
+    Both in the unit losses are counted in: packets of a LiDAR, not its scans.
+    """
     found: dict[str, tuple[int, int]] = {}
     for part, note in (said.diagnostics if said else {}).items():
-        for key, value in note.values.items():
-            if not part.startswith(_SENSOR) or not key.endswith(_LOST) or not value.isdecimal():
-                continue
-            stream = key.removesuffix(_LOST)
-            received = note.values.get(stream + _RECEIVED, "")
-            if int(value):
+        if said is None or not part.startswith(_SENSOR):
+            continue
+        before = _streams(said.first_diagnostics.get(part, Note()))
+        for stream, (count, received) in _streams(note).items():
+            count_before, received_before = before.get(stream, (0, 0))
+            if received < received_before:  # the driver was started again meanwhile, and counts from zero
+                count_before, received_before = 0, 0
+            if count > count_before:
                 name = f"{part.removeprefix(_SENSOR)} {stream}"
-                found[name] = (int(value), int(received) if received.isdecimal() else 0)
+                found[name] = (count - count_before, received - received_before)
     return found
+
+
+def _streams(note: Note) -> dict[str, tuple[int, int]]:
+    """(lost, received) by stream since the driver started."""
+    counts = {key: int(value) for key, value in note.values.items() if value.isdecimal()}
+    names = [key.removesuffix(_LOST) for key in counts if key.endswith(_LOST)]
+    return {name: (counts[name + _LOST], counts.get(name + _UNITS, counts.get(name + _RECEIVED, 0))) for name in names}
 
 
 def check_dropped(drops: Mapping[str, int], counts: Mapping[str, int]) -> Iterator[Finding]:

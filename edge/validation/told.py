@@ -47,6 +47,7 @@ class Told(msgspec.Struct, frozen=True):
     ended: str = ""
     dropped: dict[str, Drops] = {}
     diagnostics: dict[str, Note] = {}
+    first_diagnostics: dict[str, Note] = {}
     gnss_quality: dict[str, int] = {}
     clock: HostClock | None = None
     marks: tuple[Any, ...] = ()

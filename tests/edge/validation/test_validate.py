@@ -122,6 +122,19 @@ def test_the_word_of_the_recorder_counts(tmp_path):
     assert report.verdict == "WARN"
 
 
+def test_losses_are_those_of_the_session_in_the_unit_they_are_counted_in(tmp_path):
+    def notes(lost, packets, scans):
+        values = {"points.lost": lost, "points.units": packets, "points.received": scans}
+        return {"sensor/livox": {"values": {key: str(value) for key, value in values.items()}}}
+
+    summary = {"first_diagnostics": notes(9000, 50_000, 240), "diagnostics": notes(9500, 59_500, 290)}
+    report = judged(tmp_path, summary=summary)
+    assert report.lost == {"livox points": 500}
+    assert "5.0% were lost (livox points: 500)" in " ".join(report.reasons)
+    restarted = {"first_diagnostics": notes(9000, 50_000, 240), "diagnostics": notes(10, 990, 5)}
+    assert judged(tmp_path, summary=restarted).lost == {"livox points": 10}
+
+
 @pytest.mark.parametrize("codec", ["none", "lz4"])
 def test_gnss_share_is_read_from_the_fixes(tmp_path, codec):
     report = judged(tmp_path, codec=codec, statuses=(-1, -1, -1, 0, 2))
