@@ -14,6 +14,8 @@ from drivers.gopro.pts import PtsTimeline
 from drivers.gopro.transport_stream import AccessUnit
 from drivers.messages import VideoFrame
 
+REJOIN_NS = 500_000_000
+"""A stream that comes back sooner on the same clock is gone on with, like after a loss; later ones start anew."""
 PERIODS = 31
 """Frame spacings of which the smallest is the nominal one: losses only make spacings longer."""
 
@@ -35,21 +37,25 @@ class FrameBuilder:
         self._clock: SensorClock | None = None
         self._earlier_steps = 0
         self._waiting = True
+        self._restarted = False
         self._steps: deque[int] = deque(maxlen=PERIODS)
         self._lock = threading.Lock()
         self._state: ClockState | None = None
         self.tally = FrameTally()
 
     def restarted(self) -> None:
-        """The stream was started (again): wait for a keyframe, and expect another clock origin."""
-        self._waiting = True
+        """The stream was started (again): expect a hole, or another clock origin."""
+        self._restarted = True
         self._timeline.restarted()
 
     def add(self, unit: AccessUnit) -> Placed:
-        """Take one access unit in. The frame is None before the first SPS + PPS + IDR of a stream."""
+        """Take one access unit in. The frame is None before the first SPS + PPS + IDR of a clock epoch."""
         place = self._timeline.place(unit.pts, unit.receive_ns)
         if place.new_epoch:
             self._start_epoch()
+        if place.new_epoch or (self._restarted and unit.receive_ns - self.tally.last_ns > REJOIN_NS):
+            self._waiting = True
+        self._restarted = False
         assert self._clock is not None
         self._clock.observe(place.sensor_ns, unit.receive_ns)
         missing = self._missing(place.step_ticks)

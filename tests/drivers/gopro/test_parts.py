@@ -71,13 +71,17 @@ def test_lost_frames_are_counted_by_their_missing_time():
     assert (health.received, health.lost) == (6, 3)
 
 
-def test_frames_before_the_first_keyframe_are_dropped_also_after_a_restart():
+def test_frames_before_the_first_keyframe_are_dropped_also_after_a_long_hole_or_on_a_new_clock():
     builder = FrameBuilder(0)
     placed = [builder.add(AccessUnit(tiny_units()[k], k * 3003, k * FRAME_NS)) for k in range(3, 15)]
     assert [p.frame is not None for p in placed] == [False] * 7 + [True] * 5
     builder.restarted()
-    assert builder.add(AccessUnit(tiny_units()[15], 15 * 3003, 15 * FRAME_NS)).frame is None
-    assert builder.add(AccessUnit(tiny_units()[20], 20 * 3003, 20 * FRAME_NS)).frame is not None
+    assert builder.add(AccessUnit(tiny_units()[17], 17 * 3003, 17 * FRAME_NS)).frame is not None  # a short hole
+    builder.restarted()
+    assert builder.add(AccessUnit(tiny_units()[35], 35 * 3003, 35 * FRAME_NS)).frame is None
+    assert builder.add(AccessUnit(tiny_units()[40], 40 * 3003, 40 * FRAME_NS)).frame is not None
+    builder.restarted()
+    assert builder.add(AccessUnit(tiny_units()[41], 5, 41 * FRAME_NS)).frame is None  # another clock
 
 
 def test_a_known_latency_is_taken_off_the_stamp():
