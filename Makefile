@@ -24,6 +24,7 @@ slow: $(VENV)/.dev  ## the long tests: every row of docs/reliability.md
 
 screenshots: $(VENV)/.dev  ## the pictures of the README
 	$(BIN)/python -m ui.screenshots docs/images
+	$(BIN)/python -m drivers.sim.still docs/images/simulated-camera.jpg demo 18
 
 pins: $(VENV)/.dev  ## renew the hashed requirements
 	$(BIN)/pip install --quiet uv
