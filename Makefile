@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 UV_COMPILE = $(BIN)/uv pip compile pyproject.toml --extra live --universal --python-version 3.10 \
-	--generate-hashes --no-annotate --no-header --no-emit-index-url --quiet
+	--constraint requirements/constraints.txt --generate-hashes --no-annotate --no-header --no-emit-index-url --quiet
 
 .PHONY: demo test check slow screenshots pins clean
 

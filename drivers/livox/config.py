@@ -37,7 +37,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     receive_buffer_bytes: int = 8 << 20
     """Asked of the kernel for the point socket; it grants at most net.core.rmem_max."""
-    latency_s: float = 0.0
+    latency_ms: float = 0.0
     """Constant part of the transport delay, from the last point of a packet to its arrival, when it is known."""
     reply_timeout_s: float = 1.0
     attempts: int = 3

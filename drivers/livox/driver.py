@@ -53,7 +53,7 @@ class Sensor:
 
         self._crash = ""
         receiver = Receiver()
-        decoder = StreamDecoder(emit, jumped, synchronised, round(self._config.latency_s * 1e9))
+        decoder = StreamDecoder(emit, jumped, synchronised, round(self._config.latency_ms * 1e6))
         steward = Steward(self._config, receiver, lambda: decoder.point_meter.last_ns, note)
         self._reporter = Reporter(self.name, receiver, decoder, steward)
         threads = [self._thread("receive", receiver.run, stop), self._thread("steward", steward.run, stop)]

@@ -150,7 +150,7 @@ def _joined(data_type: int, parts: list[PointPackets]) -> PointPackets:
 def _points_of(packets: PointPackets, start_ns: int, end_ns: int) -> tuple[npt.NDArray[Any], ...]:
     """Columns offset_ns, xyz_m, reflectivity, tag, line of the returns in [start_ns, end_ns)."""
     point_ns = packets.point_ns().ravel()
-    points = packets.records.ravel()
+    points: npt.NDArray[Any] = packets.records.ravel()
     line = np.resize(np.arange(packets.records.shape[1]) % LASERS, points.shape).astype(np.uint8)
     wanted = (point_ns >= start_ns) & (point_ns < end_ns) & returned(points, packets.data_type)
     points = points[wanted]

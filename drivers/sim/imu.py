@@ -61,7 +61,7 @@ class Imu:
         self._white = np.repeat(white, 3) * math.sqrt(config.bandwidth_hz)
         self._range = np.repeat([config.gyro_range_rad_s, config.accel_range_g], 3)
         self._last_ns = 0
-        self._draws = np.empty((0, 12))
+        self._draws: Doubles = np.empty((0, 12))
         self._used = 0
 
     def sample(self, t_ns: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -88,7 +88,8 @@ class Imu:
 
     def _normal(self) -> Doubles:
         if self._used == len(self._draws):
-            self._draws, self._used = self._rng.normal(size=(DRAWS, 12)), 0
+            self._draws = self._rng.normal(size=(DRAWS, 12))
+            self._used = 0
         self._used += 1
         draw: Doubles = self._draws[self._used - 1]
         return draw

@@ -50,7 +50,9 @@ def _clones(
 ) -> tuple[Doubles, Doubles, npt.NDArray[np.int32]]:
     """Mother trees beside the route, each with her root suckers."""
     every = 100.0 / max(config.clones_per_100m, 0.01)
-    xy, dbh, clone = [np.empty((0, 2))], [np.empty(0)], [np.empty(0, np.int32)]
+    xy: list[Doubles] = [np.empty((0, 2))]
+    dbh: list[Doubles] = [np.empty(0)]
+    clone: list[npt.NDArray[np.int32]] = [np.empty(0, np.int32)]
     for number, spot in enumerate(np.arange(9.0, route.length_m - 3.0, every)):
         k = min(int((spot + rng.uniform(-4.0, 4.0)) / STEP_M), len(route.points_m) - 2)
         ahead = route.points_m[k + 1] - route.points_m[k]

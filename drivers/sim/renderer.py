@@ -27,6 +27,8 @@ _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1
 _FACES = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
 _FACE_LIGHT = np.array([0.8, 0.8, 0.9, 0.9, 0.6, 1.1])
 Picture = npt.NDArray[np.uint8]
+Chosen = npt.NDArray[np.int64]
+"""Rows of the scene that are near, nearest first."""
 
 
 class Poses(Protocol):
@@ -50,8 +52,10 @@ class Renderer:
         self._faces, self._face_colours = _box_faces(scene.boxes)
         self._rgb = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
         self._depth = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)
-        self._near_at = np.full(2, np.inf)
-        self._stems = self._branches = self._foliage = np.empty(0, dtype=np.int64)
+        self._near_at: Doubles = np.full(2, np.inf)
+        self._stems: Chosen = np.empty(0, dtype=np.int64)
+        self._branches: Chosen = self._stems
+        self._foliage: Chosen = self._stems
 
     @property
     def depth_m(self) -> npt.NDArray[np.float32]:
@@ -115,7 +119,7 @@ class Renderer:
         self._foliage = _nearest(leaves.centre_m, eye, reach)[:MOST_CLUMPS]
 
 
-def _nearest(points: npt.NDArray[np.floating], eye: Doubles, reach_m: npt.ArrayLike) -> npt.NDArray[np.int64]:
+def _nearest(points: npt.NDArray[np.floating], eye: Doubles, reach_m: npt.ArrayLike) -> Chosen:
     distance = np.hypot(points[:, 0] - eye[0], points[:, 1] - eye[1])
     near = np.flatnonzero(distance < reach_m)
     return near[np.argsort(distance[near])]

@@ -20,4 +20,5 @@ def still(path: str, name: str = "demo", seconds: float = 20.0) -> None:
 
 
 if __name__ == "__main__":
-    still(*sys.argv[1:3], *(float(value) for value in sys.argv[3:4]))
+    arguments = dict(zip(("path", "name"), sys.argv[1:3], strict=False))
+    still(**arguments, seconds=float((sys.argv[3:4] or ["20"])[0]))

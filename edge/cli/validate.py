@@ -49,7 +49,8 @@ def show(report: Report, out: Console) -> None:
     kind = "" if report.own else ", not recorded by mapforest: judged against itself"
     out.print(f"[{style}]{report.verdict}[/] {escape(report.target)}{kind}", highlight=False)
     facts = f"{duration(report.duration_s)}, {size(report.size_bytes)}, {report.messages:,} messages"
-    out.print(f"{date(report.start_ns)}, {facts}, {len(report.files)} files", highlight=False)
+    files = "1 file" if len(report.files) == 1 else f"{len(report.files)} files"
+    out.print(f"{date(report.start_ns)}, {facts}, {files}", highlight=False)
     for finding in report.findings:
         if finding.level is not Level.NOTE:
             word, colour = _MARKS[finding.level]

@@ -18,7 +18,6 @@ _START_WARN_S = 3.0
 _MISSING_FAIL_SHARE = 0.05
 """Of the session in gaps (leggedrobotics' health check fails there too)."""
 _LATENCY_WARN_S = 2.0
-_BURST_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,13 +161,6 @@ def latency(facts: Facts) -> Iterator[Finding]:
         yield facts.finding(Level.WARN, text, "Its clock was not synchronised; sensors may not fit together in time.")
 
 
-def bursts(facts: Facts) -> Iterator[Finding]:
-    """Not a defect where the stamps are regular; worth knowing."""
-    if facts.rates is not None and facts.rates.burst_share > _BURST_SHARE and facts.rates.count > 50:
-        text = f"Messages of {facts.name} arrived in bursts ({facts.rates.burst_share:.0%} of them close together)."
-        yield facts.finding(Level.NOTE, text, "")
-
-
 def _apart(seconds: float) -> str:
     amount = abs(seconds)
     said = (
@@ -196,5 +188,4 @@ CHECKS: tuple[Callable[[Facts], Iterator[Finding]], ...] = (
     stamp_regularity,
     reception_order,
     latency,
-    bursts,
 )

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-_BURST_SHARE = 0.2
-"""An interval below this share of the mean one belongs to a burst."""
-
 
 @dataclass(frozen=True, slots=True)
 class Span:
@@ -28,7 +25,7 @@ class Rates:
     """starts_s, gap_at_s: seconds after the session's start; ends_before_s: seconds before its end.
 
     rate_hz is the mean between the first and the last message, median_hz that of the typical interval.
-    intervals_s: (n - 1,) the intervals in order of time. burst_share: intervals far shorter than the mean.
+    intervals_s: (n - 1,) the intervals in order of time.
     """
 
     count: int
@@ -39,7 +36,6 @@ class Rates:
     largest_gap_s: float
     gap_at_s: float
     backwards: int
-    burst_share: float
     intervals_s: npt.NDArray[np.float64]
 
     def missing_s(self, longer_than_s: float) -> float:
@@ -71,6 +67,5 @@ def rates_of(times_ns: npt.NDArray[np.int64], span: Span) -> Rates:
         largest_gap_s=float(intervals_s[widest]) if widest >= 0 else 0.0,
         gap_at_s=(int(ordered[widest]) - span.start_ns) / 1e9 if widest >= 0 else 0.0,
         backwards=backwards,
-        burst_share=float(np.mean(intervals_s < _BURST_SHARE * mean_s)) if intervals_s.size else 0.0,
         intervals_s=intervals_s,
     )
