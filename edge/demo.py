@@ -131,6 +131,7 @@ def record_walk(client: ControlClient, payload: Payload, watch: Watch) -> Path:
     end_ns = payload.epoch_ns + walk_ns + int(TAIL_S * 1e9)
     reply = client.request(Request("start", mission="demo"))
     while (now_ns := time.monotonic_ns()) < end_ns:
+        payload.check()
         watch(client.status(), (now_ns - payload.epoch_ns) / (end_ns - payload.epoch_ns))
         time.sleep(POLL_S)
     client.request(Request("mark", text="end of the walk"))

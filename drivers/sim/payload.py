@@ -60,10 +60,15 @@ class PayloadConfig:
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """What the processes have in common. epoch_ns is 0 until all are ready."""
+    """What the payload and one of its processes share. epoch_ns is 0 until all are ready.
+
+    The events are each process's own, and the value has no lock: a process that is killed in a wait would leave a
+    shared event or lock unusable for all others.
+    """
 
     epoch_ns: Any
     stop: Event
+    ready: Event
 
 
 class Payload:
@@ -74,13 +79,14 @@ class Payload:
             raise SimulationError(f"GNSS errors {config.gnss!r}: expected one of {', '.join(PRESETS)}")
         self.config = config
         self._context: SpawnContext = multiprocessing.get_context("spawn")
-        self._shared = _Shared(self._context.Value("q", 0), self._context.Event())
+        self._epoch_ns = self._context.RawValue("q", 0)
+        self._shared: dict[str, _Shared] = {}
         self._processes: dict[str, SpawnProcess] = {}
 
     @property
     def epoch_ns(self) -> int:
         """CLOCK_MONOTONIC at which walk time is 0."""
-        return int(self._shared.epoch_ns.value)
+        return int(self._epoch_ns.value)
 
     @property
     def processes(self) -> dict[str, SpawnProcess]:
@@ -90,13 +96,15 @@ class Payload:
     def __enter__(self) -> Payload:
         if self.config.truth is not None:
             write_truth(build(self.config.world), self.config.truth)
-        ready = {name: self._spawn(name) for name in self.config.sensors}
+        for name in self.config.sensors:
+            self._spawn(name)
         try:
-            self._wait(ready, READY_S)
+            for name in self.config.sensors:
+                self._wait(name, READY_S)
         except SimulationError:
             self.close()
             raise
-        self._shared.epoch_ns.value = time.monotonic_ns() + LEAD_NS
+        self._epoch_ns.value = time.monotonic_ns() + LEAD_NS
         return self
 
     def __exit__(
@@ -104,46 +112,53 @@ class Payload:
     ) -> None:
         self.close()
 
+    def check(self) -> None:
+        """SimulationError when an emulator has ended by itself."""
+        for name, process in self._processes.items():
+            if process.exitcode not in {None, 0}:
+                raise SimulationError(f"the emulated {name} ended with code {process.exitcode}; its error stands above")
+
     def restart(self, name: str) -> None:
         """Start an emulator that was killed again; the walk goes on where it is now."""
-        self._wait({name: self._spawn(name)}, READY_S)
+        self._spawn(name)
+        self._wait(name, READY_S)
 
     def close(self) -> None:
         """End all emulators."""
-        self._shared.stop.set()
+        for name, process in self._processes.items():
+            if process.is_alive():
+                self._shared[name].stop.set()
         for process in self._processes.values():
             process.join(timeout=5.0)
             if process.is_alive():
                 process.kill()
                 process.join()
 
-    def _spawn(self, name: str) -> Event:
-        ready = self._context.Event()
+    def _spawn(self, name: str) -> None:
+        shared = _Shared(self._epoch_ns, self._context.Event(), self._context.Event())
         target = {"livox": _livox, "reach": _reach, "gopro": _gopro}[name]
-        arguments = (target, self.config, self._shared, ready)
+        arguments = (target, self.config, shared)
         process = self._context.Process(target=_emulate, args=arguments, name=f"emulated-{name}", daemon=True)
         process.start()
-        self._processes[name] = process
-        return ready
+        self._processes[name], self._shared[name] = process, shared
 
-    def _wait(self, ready: dict[str, Event], timeout_s: float) -> None:
+    def _wait(self, name: str, timeout_s: float) -> None:
         deadline_s = time.monotonic() + timeout_s
-        for name, event in ready.items():
-            while not event.wait(0.2):
-                if not self._processes[name].is_alive():
-                    raise SimulationError(f"the emulated {name} ended while starting; its error stands above")
-                if time.monotonic() > deadline_s:
-                    raise SimulationError(f"the emulated {name} was not ready within {timeout_s:.0f} s")
+        while not self._shared[name].ready.wait(0.2):
+            if not self._processes[name].is_alive():
+                raise SimulationError(f"the emulated {name} ended while starting; its error stands above")
+            if time.monotonic() > deadline_s:
+                raise SimulationError(f"the emulated {name} was not ready within {timeout_s:.0f} s")
 
 
-def _emulate(body: Callable[..., None], config: PayloadConfig, shared: _Shared, ready: Event) -> None:
+def _emulate(body: Callable[..., None], config: PayloadConfig, shared: _Shared) -> None:
     """Root of an emulator's process. Ctrl-C is the parent's to handle; when the parent is killed, so is this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
     def start() -> int:
         """Tell that everything slow is done, and wait for the common start."""
-        ready.set()
+        shared.ready.set()
         while shared.epoch_ns.value == 0 and not shared.stop.wait(0.005):
             continue
         return int(shared.epoch_ns.value)

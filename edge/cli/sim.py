@@ -8,6 +8,8 @@ from pathlib import Path
 
 import msgspec
 
+from drivers.sim import faults, scenarios
+from drivers.sim.payload import Payload, PayloadConfig
 from edge import toml_table
 from edge.cli import exit_codes
 from edge.errors import UsageError
@@ -34,9 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Emulate until interrupted or until the duration is over."""
-    from drivers.sim import faults, scenarios  # heavy: only for this command
-    from drivers.sim.payload import Payload, PayloadConfig
-
     if args.list:
         _list(sorted(scenarios.SCENARIOS), faults.KINDS, as_json=args.json)
         return exit_codes.GOOD
@@ -49,14 +48,15 @@ def run(args: argparse.Namespace) -> int:
         return exit_codes.GOOD
     with Payload(config) as payload:
         print(f"emulated payload is up: {', '.join(payload.processes)} on loopback; Ctrl-C ends it")
-        _idle(args.duration)
+        _idle(payload, args.duration)
     return exit_codes.GOOD
 
 
-def _idle(duration_s: float | None) -> None:
+def _idle(payload: Payload, duration_s: float | None) -> None:
     end_s = None if duration_s is None else time.monotonic() + duration_s
     try:
         while end_s is None or time.monotonic() < end_s:
+            payload.check()
             time.sleep(0.2)
     except KeyboardInterrupt:
         return

@@ -1,6 +1,5 @@
 """Rates and gaps against numbers worked out by hand, and against a slow version."""
 
-
 import numpy as np
 import pytest
 
