@@ -1,0 +1,61 @@
+"""The three senders, each in a process of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.synchronize import Event
+
+from benchmarks.recording.load import Load
+
+READY_S = 30.0
+
+
+@contextmanager
+def payload(load: Load) -> Iterator[dict[str, int]]:
+    """All senders running; their process ids by name."""
+    context = multiprocessing.get_context("spawn")
+    stop = context.Event()
+    bodies = {"lidar": _lidar, "receiver": _receiver, "camera": _camera}
+    processes = {}
+    for name, body in bodies.items():
+        ready = context.Event()
+        processes[name] = context.Process(target=body, args=(load, ready, stop), name=f"canned-{name}", daemon=True)
+        processes[name].start()
+        if not ready.wait(READY_S):
+            raise RuntimeError(f"the sender {name} did not start")
+    try:
+        yield {name: process.pid or 0 for name, process in processes.items()}
+    finally:
+        stop.set()
+        for process in processes.values():
+            process.join(10.0)
+
+
+def _lidar(load: Load, ready: Event, stop: Event) -> None:
+    from benchmarks.recording.lidar import CannedLidar  # noqa: PLC0415 - each process loads its own sensor
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    CannedLidar(load, time.monotonic_ns()).run(stop, None, ready.set)
+
+
+def _receiver(load: Load, ready: Event, stop: Event) -> None:
+    from benchmarks.recording import receiver  # noqa: PLC0415
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ready.set()
+    receiver.run(load, stop)
+
+
+def _camera(load: Load, ready: Event, stop: Event) -> None:
+    from benchmarks.recording.camera import CannedCamera  # noqa: PLC0415
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    camera = CannedCamera(load, time.monotonic_ns())
+    camera.start()
+    ready.set()
+    stop.wait()
+    camera.stop()
