@@ -1,0 +1,1 @@
+"""One recording opened by programs that are not ours."""
