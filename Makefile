@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 UV_COMPILE = $(BIN)/uv pip compile pyproject.toml --extra live --universal --python-version 3.10 \
 	--constraint requirements/constraints.txt --generate-hashes --no-annotate --no-header --no-emit-index-url --quiet
 
-.PHONY: demo test check slow screenshots pins clean
+.PHONY: demo test check slow bench-recording screenshots pins clean
 
 demo: $(VENV)/.run  ## the whole mission on the emulated payload
 	$(BIN)/mapforest demo
@@ -21,6 +21,9 @@ check: $(VENV)/.dev
 
 slow: $(VENV)/.dev  ## the long tests: every row of docs/reliability.md
 	$(BIN)/python -m pytest -m slow --timeout 1200
+
+bench-recording: $(VENV)/.dev  ## CPU, losses, latency and memory of the recorder: docs/cpu-budget.md
+	$(BIN)/python -m benchmarks.recording --memory-minutes 10
 
 screenshots: $(VENV)/.dev  ## the pictures of the README
 	$(BIN)/python -m ui.screenshots docs/images

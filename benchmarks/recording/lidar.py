@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import zlib
+from multiprocessing.sharedctypes import Synchronized
 
 import numpy as np
 import numpy.typing as npt
@@ -25,10 +26,13 @@ INTERVAL, COUNT, STAMP = slice(3, 5), slice(7, 9), slice(28, 36)
 class CannedLidar(livox_emulator.Emulator):
     """The emulated Mid-360 with its control port and status; its streams are sent as cheaply as can be."""
 
-    def __init__(self, load: Load, epoch_ns: int) -> None:
+    def __init__(self, load: Load, epoch_ns: int, pause_s: Synchronized[float]) -> None:
+        """pause_s: takes the longest time between two sendings, which shows a sender that was starved."""
         options = DeviceOptions(stored_host=load.host)
         super().__init__(_Nothing(), _Nothing(), FaultPlan("livox", ()), epoch_ns, address=load.lidar, options=options)
         self._load = load
+        self._pause_s = pause_s
+        self._last_ns = 0
         self._packets = _canned(load)
         self._rows = [memoryview(row) for row in self._packets]
         self._imu = bytearray(imu_packet((0.01, -0.02, 0.03), (0.01, 0.02, 1.0), 0, 0))
@@ -43,8 +47,10 @@ class CannedLidar(livox_emulator.Emulator):
             self._began_ns = 0
             return
         if not self._began_ns:
-            self._began_ns, self._points_sent, self._imu_sent = now_ns, 0, 0
+            self._began_ns, self._points_sent, self._imu_sent, self._last_ns = now_ns, 0, 0, now_ns
             self._sensor_ns = now_ns - self.device.machine.power_on_ns
+        self._pause_s.value = max(self._pause_s.value, (now_ns - self._last_ns) / 1e9)
+        self._last_ns = now_ns
         self._send_points(now_ns - self._began_ns)
         self._send_imu(now_ns - self._began_ns)
 

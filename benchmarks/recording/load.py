@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from random import randint
 
 from drivers.livox.packets import POINTS_PER_PACKET
 
@@ -20,11 +21,11 @@ GNSS_PORT, HTTP_PORT = 9001, 8080
 class Load:
     """factor 1: 200,000 points/s, IMU 200 Hz, GNSS 10 Hz, video 30 frames/s. 5: five times as dense.
 
-    network: first three numbers of the loopback addresses, so that nothing else on the machine is met.
+    network: first three numbers of the loopback addresses; any, so that nothing else on the machine is met.
     """
 
     factor: int = 1
-    network: str = "127.61.7"
+    network: str = field(default_factory=lambda: f"127.{randint(30, 250)}.{randint(1, 250)}")
 
     @property
     def host(self) -> str:

@@ -85,7 +85,8 @@ def _trial_rows(trial: Trial) -> Iterator[Row]:
     told = ", ".join(f"{name} {count}" for name, count in details.items() if count) or "0 of all streams"
     yield Row(f"{name} losses", told, "0", trial.losses == 0)
     yield Row(f"{name} worst flush seen", f"{trial.flush_worst_ms:.1f} ms")
-    yield Row(f"{name} senders", f"{sum(trial.senders_cores.values()):.3f} core")
+    value = f"{sum(trial.senders_cores.values()):.3f} core, held up for at most {trial.sender_pause_s * 1e3:.0f} ms"
+    yield Row(f"{name} senders", value)
     if trial.factor == 1:
         yield _memory_row(trial)
 

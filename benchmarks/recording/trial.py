@@ -29,6 +29,8 @@ class Trial:
     """The same with all sensors streaming and nothing being recorded."""
     cores_by_thread: dict[str, float]
     senders_cores: dict[str, float]
+    sender_pause_s: float
+    """The longest the LiDAR's sender was held up: what follows is a burst no LiDAR would send."""
     lost_by_stream: dict[str, int]
     trouble: dict[str, int]
     dropped: int
@@ -58,13 +60,15 @@ def record(
         lost_before, trouble_before = lost(status), trouble(status)
         session = Path(bench.client.request(Request("start", mission="bench")).folder)
         time.sleep(SETTLE_S)
-        sent_before = {name: usage(pid) for name, pid in senders.items()}
+        sent_before = {name: usage(pid) for name, pid in senders.pids.items()}
+        senders.pause_s.value = 0.0
         start, start_s = usage(bench.pid), time.monotonic()
         rss, flush_worst_ms = _watch(bench, seconds)
         end, elapsed_s = usage(bench.pid), time.monotonic() - start_s
         senders_cores = {
-            name: (usage(pid).process_s - sent_before[name].process_s) / elapsed_s for name, pid in senders.items()
+            name: (usage(pid).process_s - sent_before[name].process_s) / elapsed_s for name, pid in senders.pids.items()
         }
+        pause_s = senders.pause_s.value
         status = bench.client.status()
         dropped = status.recording.dropped if status.recording else 0
         lost_after, trouble_after = lost(status), trouble(status)
@@ -83,6 +87,7 @@ def record(
         cores_idle=idle,
         cores_by_thread=_by_thread(start, end, elapsed_s),
         senders_cores=senders_cores,
+        sender_pause_s=pause_s,
         lost_by_stream=_since(lost_before, lost_after),
         trouble=_since(trouble_before, trouble_after),
         dropped=dropped,
