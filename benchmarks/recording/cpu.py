@@ -30,6 +30,11 @@ def usage(pid: int) -> Usage:
     return Usage((int(words[11]) + int(words[12])) * TICK_S, threads)
 
 
+def niceness(pid: int) -> int:
+    """Priority the process runs at; -20 is the highest."""
+    return os.getpriority(os.PRIO_PROCESS, pid)
+
+
 def rss_mib(pid: int) -> float:
     """Resident memory."""
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():

@@ -1,14 +1,18 @@
-"""`mapforest recorder`, with the names of its threads told to the kernel so that their CPU can be told apart."""
+"""`mapforest recorder` at its priority, with the names of its threads told to the kernel to tell their CPU apart."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import os
 import sys
 import threading
 
 from edge.cli.main import main
 
 PR_SET_NAME = 15
+NICE = -5
+"""As in the recorder's systemd unit, where this user may ask for it."""
 
 
 def _name_threads() -> None:
@@ -24,4 +28,6 @@ def _name_threads() -> None:
 
 if __name__ == "__main__":
     _name_threads()
+    with contextlib.suppress(PermissionError):
+        os.nice(NICE)
     sys.exit(main(["recorder", *sys.argv[1:]]))

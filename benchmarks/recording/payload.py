@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -14,6 +16,8 @@ from multiprocessing.synchronize import Event
 from benchmarks.recording.load import Load
 
 READY_S = 30.0
+NICE = -10
+"""Hardware does not wait for a processor. Where this user may not ask for that, the senders run as all else does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +55,14 @@ def payload(load: Load) -> Iterator[Senders]:
 def _lidar(load: Load, ready: Event, stop: Event, pause_s: Synchronized[float]) -> None:
     from benchmarks.recording.lidar import CannedLidar  # noqa: PLC0415 - each process loads its own sensor
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _prepare()
     CannedLidar(load, time.monotonic_ns(), pause_s).run(stop, None, ready.set)
 
 
 def _receiver(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> None:
     from benchmarks.recording import receiver  # noqa: PLC0415
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _prepare()
     ready.set()
     receiver.run(load, stop)
 
@@ -66,9 +70,16 @@ def _receiver(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> 
 def _camera(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> None:
     from benchmarks.recording.camera import CannedCamera  # noqa: PLC0415
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _prepare()
     camera = CannedCamera(load, time.monotonic_ns())
     camera.start()
     ready.set()
     stop.wait()
     camera.stop()
+
+
+def _prepare() -> None:
+    """Ctrl-C is the parent's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(PermissionError):
+        os.nice(NICE)

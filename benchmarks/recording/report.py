@@ -87,6 +87,7 @@ def _trial_rows(trial: Trial) -> Iterator[Row]:
     yield Row(f"{name} worst flush seen", f"{trial.flush_worst_ms:.1f} ms")
     value = f"{sum(trial.senders_cores.values()):.3f} core, held up for at most {trial.sender_pause_s * 1e3:.0f} ms"
     yield Row(f"{name} senders", value)
+    yield Row(f"{name} load average", f"{trial.load_average}, recorder at nice {trial.nice}")
     if trial.factor == 1:
         yield _memory_row(trial)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from benchmarks.recording.audit import audit
 from benchmarks.recording.bench import Bench, lost, recorder, trouble, wait_for_verdict
-from benchmarks.recording.cpu import Usage, load_average, rss_mib, usage
+from benchmarks.recording.cpu import Usage, load_average, niceness, rss_mib, usage
 from benchmarks.recording.load import Load
 from benchmarks.recording.payload import payload
 from edge.control.messages import Request
@@ -43,6 +43,8 @@ class Trial:
     rss_mib: tuple[float, ...]
     """Every tenth of the time, at least every 10 s."""
     load_average: str
+    nice: int
+    """Priority of the recorder: -5 as in its unit, 0 where that was not granted."""
 
     @property
     def losses(self) -> int:
@@ -72,7 +74,7 @@ def record(
         status = bench.client.status()
         dropped = status.recording.dropped if status.recording else 0
         lost_after, trouble_after = lost(status), trouble(status)
-        load_was = load_average()
+        load_was, nice = load_average(), niceness(bench.pid)
         bench.client.request(Request("stop"))
         verdict, reasons = wait_for_verdict(bench.client)
     audited = audit(session, load)
@@ -99,6 +101,7 @@ def record(
         flush_worst_ms=flush_worst_ms,
         rss_mib=rss,
         load_average=load_was,
+        nice=nice,
     )
 
 
