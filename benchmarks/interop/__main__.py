@@ -2,7 +2,7 @@
 
 The peers are installed apart from this program, since they pin other versions of what it needs:
 
-    python3 -m venv peers && peers/bin/pip install kiss-icp rko_lio rosbags pyyaml typer tqdm
+    python3 -m venv peers && peers/bin/pip install kiss-icp "rko_lio[all]"
     npm install --prefix peers @mcap/core
     python -m benchmarks.interop demo/recordings/*_demo --peers-python peers/bin/python --node peers/node_modules
 

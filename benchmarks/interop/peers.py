@@ -42,7 +42,7 @@ def rosbags_folder(asked: Asked) -> dict[str, int]:
 
 
 def rosbags_files(asked: Asked) -> dict[str, int]:
-    """The files one by one. Here with the rosbags of this environment: peers pin versions before 0.10, which cannot."""
+    """The files one by one, by the rosbags of this environment: peers may pin 0.9, which reads folders only."""
     return _counts(asked, [sys.executable, PROBES / "rosbags_reader.py", *asked.files])
 
 
