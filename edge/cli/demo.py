@@ -16,6 +16,7 @@ from drivers.sim.payload import Payload
 from drivers.sim.scenarios import scenario
 from edge import demo
 from edge.cli import exit_codes
+from edge.cli.ending import end_with_the_terminal
 from edge.cli.evaluate import clock_table
 from edge.control.client import ControlClient
 from edge.control.messages import Status, Verdict
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Exit code as the verdict: 0 PASS, 3 WARN, 1 FAIL."""
+    end_with_the_terminal()
     console = Console(stderr=args.json)
     stage = demo.Stage(args.folder.absolute())
     config = demo.payload_config(stage, scenario(args.scenario, args.seed))

@@ -12,6 +12,7 @@ from drivers.sim import faults, scenarios
 from drivers.sim.payload import Payload, PayloadConfig
 from edge import toml_table
 from edge.cli import exit_codes
+from edge.cli.ending import end_with_the_terminal
 from edge.errors import UsageError
 
 HELP = """run the emulated payload alone, in real time, with faults on demand
@@ -46,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
     if args.print_config:
         print(toml_table.render({"sensors": config.driver_tables()}))
         return exit_codes.GOOD
+    end_with_the_terminal()
     with Payload(config) as payload:
         print(f"emulated payload is up: {', '.join(payload.processes)} on loopback; Ctrl-C ends it")
         _idle(payload, args.duration)
