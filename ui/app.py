@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from ui.widgets.dashboard import Dashboard
 
 DRAW_S = 0.5
 """Twice a second is as fast as numbers are read, and leaves room on a slow link."""
+TERMINAL_S = 2.0
 NOTICE_S = 8.0
 RESTART_S = 2.0
 CONNECTION = "connection"
@@ -45,6 +47,8 @@ class Options:
     sun: bool = False
     bell: bool = False
     ascii_only: bool = False
+    terminal: int | None = None
+    """File descriptor of the terminal: the screen ends with it. None without one, in tests."""
 
 
 class RecorderApp(App[str]):
@@ -74,7 +78,7 @@ class RecorderApp(App[str]):
         options = options or Options()
         self.ascii_only = options.ascii_only
         self.animation_level = "none"
-        self._bell, self._sun = options.bell, options.sun
+        self._bell, self._sun, self._terminal = options.bell, options.sun, options.terminal
         self._connection = connection
         self._clock = clock
         self._dashboard = Dashboard()
@@ -101,7 +105,14 @@ class RecorderApp(App[str]):
         self._ready_to_draw = True
         self.draw()
         self.set_interval(DRAW_S, self.draw)
+        if self._terminal is not None:
+            self.set_interval(TERMINAL_S, self._end_with_terminal)
         self._connect()
+
+    def _end_with_terminal(self) -> None:
+        """A terminal that hung up reads as empty for ever: without this the screen spins, seen by nobody."""
+        if self._terminal is not None and not os.isatty(self._terminal):
+            self.exit()
 
     def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
         """A connection that failed in a way it should not have is said, and made anew."""

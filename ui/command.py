@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 from ui.app import Options, RecorderApp
@@ -12,5 +13,5 @@ from ui.glyphs import needs_plain
 
 def run(socket_path: Path, *, sun: bool = False, bell: bool = False, ascii_only: bool = False) -> str:
     """Show the recorder at `socket_path` until the operator leaves. Returns a last word to print, or nothing."""
-    options = Options(sun, bell, ascii_only or needs_plain(os.environ))
+    options = Options(sun, bell, ascii_only or needs_plain(os.environ), sys.stdin.fileno())
     return RecorderApp(SocketConnection(socket_path), options).run() or ""

@@ -1,6 +1,8 @@
 """`mapforest tui`: options in, the last word out, and nothing of it in the service."""
 
 import argparse
+import os
+import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -63,3 +65,16 @@ def test_the_command_table_and_the_service_never_load_textual():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_screen_whose_terminal_hung_up_ends(tmp_path):
+    # As when the link drops and nobody passes the hang-up on as a signal.
+    master, slave = pty.openpty()
+    command = [sys.executable, "-m", "edge.cli.main", "tui", "--socket", str(tmp_path / "nobody.sock")]
+    screen = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, start_new_session=True)
+    os.close(slave)
+    shown = b""
+    while b"\x1b[" not in shown:
+        shown += os.read(master, 65536)
+    os.close(master)
+    assert screen.wait(timeout=60) == exit_codes.GOOD
