@@ -11,9 +11,10 @@ import numpy as np
 from mcap.reader import make_reader
 
 from benchmarks.recording.load import RETURNS_PER_PACKET, SENTENCES_PER_EPOCH, Load
-from edge.ros.decode import decode_point_cloud
+from edge.ros.decode import decode_log, decode_point_cloud
 
 LIDAR, IMU, FIX, NMEA, VIDEO = "/livox/lidar", "/livox/imu", "/gnss/fix", "/gnss/nmea", "/camera/video"
+EVENTS = "/events"
 SHUTTER_NS = 2_500_000_000
 """A HERO8 interrupts its stream when it starts to record on its card, which the start of a session makes it do."""
 
@@ -24,6 +25,8 @@ class Audit:
 
     counts: dict[str, int]
     missing: dict[str, int]
+    events: tuple[str, ...]
+    """What the recorder noted, as seconds after the first message and text."""
     bytes: int
 
 
@@ -32,10 +35,13 @@ def audit(folder: Path, load: Load) -> Audit:
     counts: Counter[str] = Counter()
     stamps: dict[str, list[int]] = {}
     widths: list[int] = []
+    events: list[str] = []
     steady_ns = 0
     for topic, stamp_ns, data in messages(folder):
         steady_ns = steady_ns or stamp_ns + SHUTTER_NS
         counts[topic] += 1
+        if topic == EVENTS:
+            events.append(f"{(stamp_ns - steady_ns + SHUTTER_NS) / 1e9:.1f} s: {decode_log(data).text}")
         if stamp_ns < steady_ns:
             continue
         stamps.setdefault(topic, []).append(stamp_ns)
@@ -49,7 +55,7 @@ def audit(folder: Path, load: Load) -> Audit:
         LIDAR: _missing_packets(widths, stamps.get(LIDAR, []), load),
     }
     size = sum(path.stat().st_size for path in folder.glob("*.mcap"))
-    return Audit(dict(counts), missing, size)
+    return Audit(dict(counts), missing, tuple(events), size)
 
 
 def messages(folder: Path) -> Iterator[tuple[str, int, bytes]]:

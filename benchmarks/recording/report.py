@@ -84,6 +84,8 @@ def _trial_rows(trial: Trial) -> Iterator[Row]:
     details = {**trial.lost_by_stream, **trial.missing, "dropped by the queue": trial.dropped, **trial.trouble}
     told = ", ".join(f"{name} {count}" for name, count in details.items() if count) or "0 of all streams"
     yield Row(f"{name} losses", told, "0", trial.losses == 0)
+    for event in trial.events:
+        yield Row(f"{name}   event", event)
     yield Row(f"{name} worst flush seen", f"{trial.flush_worst_ms:.1f} ms")
     value = f"{sum(trial.senders_cores.values()):.3f} core, held up for at most {trial.sender_pause_s * 1e3:.0f} ms"
     yield Row(f"{name} senders", value)
@@ -93,8 +95,8 @@ def _trial_rows(trial: Trial) -> Iterator[Row]:
 
 
 def _memory_row(trial: Trial) -> Row:
-    """Growth per ten minutes: a line through the last two thirds."""
-    settled = trial.rss_mib[len(trial.rss_mib) // 3 :]
+    """Growth per ten minutes: a line through the second half, since the first splits warm up the allocator."""
+    settled = trial.rss_mib[len(trial.rss_mib) // 2 :]
     step_s = trial.seconds / (len(trial.rss_mib) - 1)
     slope = float(np.polyfit(np.arange(len(settled)) * step_s, settled, 1)[0]) * 600
     value = f"{min(trial.rss_mib):.1f} to {max(trial.rss_mib):.1f} MiB, {slope:+.1f} MiB/10 min"

@@ -36,6 +36,7 @@ class Trial:
     dropped: int
     missing: dict[str, int]
     counts: dict[str, int]
+    events: tuple[str, ...]
     megabytes_per_s: float
     verdict: str
     reasons: tuple[str, ...]
@@ -95,6 +96,7 @@ def record(
         dropped=dropped,
         missing=audited.missing,
         counts=audited.counts,
+        events=audited.events,
         megabytes_per_s=audited.bytes / (elapsed_s + SETTLE_S) / 1e6,
         verdict=verdict,
         reasons=reasons,

@@ -42,7 +42,8 @@ class Block:
     """Datagrams as they came: bytes one a row, lengths, times of reception. Filled by one thread, read by another."""
 
     def __init__(self) -> None:
-        self.slots: npt.NDArray[np.uint8] = np.zeros((BLOCK_SLOTS, SLOT_BYTES), np.uint8)
+        # Filled, so that the pages are there: those of np.zeros would come when the host is late already.
+        self.slots: npt.NDArray[np.uint8] = np.full((BLOCK_SLOTS, SLOT_BYTES), 0xFF, np.uint8)
         self.rows = [memoryview(row) for row in self.slots]
         self.lengths: list[int] = []
         self.receive_ns: list[int] = []
