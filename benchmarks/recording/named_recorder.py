@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
-import os
 import sys
 import threading
 
+from benchmarks.recording.priority import claim
 from edge.cli.main import main
 
 PR_SET_NAME = 15
@@ -28,6 +27,5 @@ def _name_threads() -> None:
 
 if __name__ == "__main__":
     _name_threads()
-    with contextlib.suppress(PermissionError):
-        os.nice(NICE)
+    claim(NICE)
     sys.exit(main(["recorder", *sys.argv[1:]]))

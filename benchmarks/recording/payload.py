@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
-import os
 import signal
 import time
 from collections.abc import Iterator
@@ -14,6 +12,7 @@ from multiprocessing.sharedctypes import Synchronized
 from multiprocessing.synchronize import Event
 
 from benchmarks.recording.load import Load
+from benchmarks.recording.priority import claim
 
 READY_S = 30.0
 NICE = -10
@@ -81,5 +80,4 @@ def _camera(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> No
 def _prepare() -> None:
     """Ctrl-C is the parent's to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with contextlib.suppress(PermissionError):
-        os.nice(NICE)
+    claim(NICE)

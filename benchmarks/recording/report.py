@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -85,7 +86,7 @@ def _trial_rows(trial: Trial) -> Iterator[Row]:
     told = ", ".join(f"{name} {count}" for name, count in details.items() if count) or "0 of all streams"
     yield Row(f"{name} losses", told, "0", trial.losses == 0)
     for event in trial.events:
-        yield Row(f"{name}   event", event)
+        yield Row(f"{name}   event", textwrap.shorten(event, 60, placeholder=" ..."))
     yield Row(f"{name} worst flush seen", f"{trial.flush_worst_ms:.1f} ms")
     value = f"{sum(trial.senders_cores.values()):.3f} core, held up for at most {trial.sender_pause_s * 1e3:.0f} ms"
     yield Row(f"{name} senders", value)
