@@ -36,6 +36,7 @@ class FrameBuilder:
         self._timeline = PtsTimeline()
         self._clock: SensorClock | None = None
         self._earlier_steps = 0
+        self._received_ns = 0
         self._waiting = True
         self._restarted = False
         self._steps: deque[int] = deque(maxlen=PERIODS)
@@ -68,7 +69,9 @@ class FrameBuilder:
             return Placed(None, place.new_epoch)
         self.tally.count(unit.receive_ns, missing)
         stamp_ns = self._clock.to_host_ns(place.sensor_ns)
-        return Placed(VideoFrame(stamp_ns, unit.receive_ns, unit.data, kind.idr, unit.pts), place.new_epoch)
+        # A frame that was overtaken keeps its place in the file, which readers sort by reception.
+        self._received_ns = max(self._received_ns, unit.receive_ns)
+        return Placed(VideoFrame(stamp_ns, self._received_ns, unit.data, kind.idr, unit.pts), place.new_epoch)
 
     def clock_state(self) -> ClockState | None:
         """From any thread. Steps include the new epochs."""

@@ -13,6 +13,7 @@ from drivers.clock import ClockState, ClockStep, SensorClock
 from drivers.driver import Emit
 from drivers.livox.counter import PacketCounter, Verdict
 from drivers.livox.meter import RateMeter
+from drivers.livox.order import Sample, SampleOrder
 from drivers.livox.packets import (
     HEADER,
     INTERVAL_UNIT_NS,
@@ -54,6 +55,7 @@ class StreamDecoder:
         self._on_sync = on_sync
         self._clock = SensorClock(latency_ns=latency_ns)
         self._assembler = ScanAssembler(self._clock.to_host_ns, self._emit_scan)
+        self._samples = SampleOrder(self._emit_imu)
         self._time_type = 0
         self.points = PacketCounter(PACKET_NS)
         self.imu = PacketCounter(IMU_NS)
@@ -87,6 +89,7 @@ class StreamDecoder:
 
     def flush(self) -> None:
         """Send out the unfinished scan: the stream fell silent, or the driver stops."""
+        self._samples.release()
         self._assembler.flush()
 
     def _runs(self, block: Block, head: npt.NDArray[Any], rows: list[int]) -> Iterator[list[int]]:
@@ -97,20 +100,25 @@ class StreamDecoder:
             data_type, udp_cnt, sensor_ns, interval, time_type = (column[row] for column in columns)
             arrival_ns = block.receive_ns[row]
             inertial = data_type == DataType.IMU
-            verdict = (self.imu if inertial else self.points).take(udp_cnt, sensor_ns, arrival_ns)
+            counter = self.imu if inertial else self.points
+            lost = counter.lost
+            verdict = counter.take(udp_cnt, sensor_ns, arrival_ns)
             if verdict not in WANTED:
                 continue
             step = self._clock.observe(sensor_ns + interval * INTERVAL_UNIT_NS, arrival_ns)
             if verdict is Verdict.JUMPED or step is not None:
                 yield run
                 run = []
+                self._samples.restart()
                 self._assembler.flush()
                 self._on_jump(step, arrival_ns)
             if time_type != self._time_type:
                 self._time_type = time_type
                 self._on_sync(TIME_SOURCES.get(time_type, f"type {time_type}"), arrival_ns)
             if inertial:
-                self._emit_imu(block.rows[row], sensor_ns, arrival_ns)
+                values = _IMU.unpack_from(block.rows[row], HEADER.itemsize)
+                if not self._samples.take(Sample(sensor_ns, arrival_ns, values), counter.lost - lost):
+                    counter.lost += 1
             else:
                 run.append(row)
         yield run
@@ -137,11 +145,12 @@ class StreamDecoder:
                 )
             )
 
-    def _emit_imu(self, row: memoryview, sensor_ns: int, receive_ns: int) -> None:
-        gx, gy, gz, ax, ay, az = _IMU.unpack_from(row, HEADER.itemsize)
-        self.imu_meter.mark(receive_ns)
+    def _emit_imu(self, sample: Sample) -> None:
+        gx, gy, gz, ax, ay, az = sample.values
+        self.imu_meter.mark(sample.receive_ns)
         acceleration = (ax * STANDARD_GRAVITY, ay * STANDARD_GRAVITY, az * STANDARD_GRAVITY)
-        self._emit(ImuSample(self._clock.to_host_ns(sensor_ns), receive_ns, (gx, gy, gz), acceleration))
+        stamp_ns = self._clock.to_host_ns(sample.sensor_ns)
+        self._emit(ImuSample(stamp_ns, sample.receive_ns, (gx, gy, gz), acceleration))
 
     def _emit_scan(self, scan: LidarScan) -> None:
         self.scan_meter.mark(scan.receive_ns)

@@ -13,7 +13,9 @@ from drivers.driver import Driver
 from edge.config import Config, sensor_driver, sensor_settings, to_toml
 from edge.control.messages import Reply, Request, Status
 from edge.paths import control_socket, recordings_folder
+from edge.recording.calibration import load_calibration
 from edge.recording.session import repair_leftovers
+from edge.ros.topics import channels
 from edge.service.control_server import ControlServer
 from edge.service.health import Health
 from edge.service.intake import Intake
@@ -40,7 +42,13 @@ class Service:
         judge: Judge | None = None,
         notifier: Notifier | None = None,
     ) -> None:
-        """plans, judge, notifier: others than the configured ones, for tests. ConfigError for a bad driver table."""
+        """plans, judge, notifier: others than the configured ones, for tests.
+
+        ConfigError for whatever would keep a session from starting later, in the field: a bad driver table, topics
+        that clash, a calibration that cannot be used.
+        """
+        channels(config.topics)
+        load_calibration(config.calibration)
         self._config = config
         self._notifier = notifier or Notifier()
         self._live = LiveView(config) if config.live.enabled else None
