@@ -105,12 +105,15 @@ class StreamDecoder:
             verdict = counter.take(udp_cnt, sensor_ns, arrival_ns)
             if verdict not in WANTED:
                 continue
+            if verdict is Verdict.JUMPED:  # what came before goes out by the clock of before
+                yield run
+                run = []
+                self._finish_line()
             step = self._clock.observe(sensor_ns + interval * INTERVAL_UNIT_NS, arrival_ns)
             if verdict is Verdict.JUMPED or step is not None:
                 yield run
                 run = []
-                self._samples.restart()
-                self._assembler.flush()
+                self._finish_line()
                 self._on_jump(step, arrival_ns)
             if time_type != self._time_type:
                 self._time_type = time_type
@@ -122,6 +125,11 @@ class StreamDecoder:
             else:
                 run.append(row)
         yield run
+
+    def _finish_line(self) -> None:
+        """Send out all there is of the device's present line of time."""
+        self._samples.restart()
+        self._assembler.flush()
 
     def _collect(
         self, slots: npt.NDArray[np.uint8], head: npt.NDArray[Any], receive_ns: npt.NDArray[np.int64], run: list[int]

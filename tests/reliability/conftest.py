@@ -19,9 +19,7 @@ def figures(request: pytest.FixtureRequest) -> Callable[..., None]:
 
     def note(lost: str, told: object = ()) -> None:
         lines = [told] if isinstance(told, str) else list(told)  # type: ignore[call-overload]
-        request.config.stash[_ROWS].append(
-            "\n".join([f"{request.node.name}: {lost}", *(f"    {one}" for one in lines)])
-        )
+        request.config.stash[_ROWS].append("\n    ".join([f"{request.node.name}: {lost}", *lines]))
 
     return note
 

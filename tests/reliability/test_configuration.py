@@ -10,10 +10,7 @@ from edge.cli.main import main
 from tests.reliability.chain import ROOT
 
 BROKEN = {
-    "grammar": (
-        "[recording\n",
-        "not valid TOML: Expected ']' at the end of a table declaration (at line 1, column 11)",
-    ),
+    "grammar": ("[recording\n", "not valid TOML: "),
     "key": ("[recording]\nsplit_sec = 60\n", "unknown key 'recording.split_sec': did you mean 'split_s'?"),
     "table": ("[recordings]\n", "unknown key 'recordings': did you mean 'recording'?"),
     "quotes": ('[recording]\nsplit_s = "60"\n', 'recording.split_s: found "60", expected a number'),
