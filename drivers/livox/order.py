@@ -6,8 +6,8 @@ import bisect
 from collections.abc import Callable
 from typing import NamedTuple
 
-PATIENCE = 4
-"""Samples (20 ms) held back while an earlier one is missing. Over a cable nothing overtakes, and nothing is held."""
+PATIENCE_NS = 20_000_000
+"""So long, four samples, one waits for those missing before it. Over a cable nothing overtakes, and nothing waits."""
 
 
 class Sample(NamedTuple):
@@ -25,6 +25,7 @@ class SampleOrder:
         self._emit = emit
         self._held: list[Sample] = []
         self._missing = 0
+        self._wait_ns = 0
         self._passed_ns = -1
         self._received_ns = 0
 
@@ -34,14 +35,23 @@ class SampleOrder:
             return False
         bisect.insort(self._held, sample)
         self._missing += missing
-        if self._missing <= 0 or missing > PATIENCE or len(self._held) > PATIENCE:
+        newest_ns = self._held[-1].sensor_ns
+        if missing > 0:
+            self._wait_ns = newest_ns + PATIENCE_NS
+        if self._missing <= 0 or newest_ns >= self._wait_ns:
             self.release()
+        else:
+            self._pass(bisect.bisect(self._held, newest_ns - PATIENCE_NS, key=_device_time))
         return True
 
     def release(self) -> None:
         """Wait no longer."""
-        held, self._held, self._missing = self._held, [], 0
-        for sample in held:
+        self._missing = 0
+        self._pass(len(self._held))
+
+    def _pass(self, count: int) -> None:
+        passed, self._held = self._held[:count], self._held[count:]
+        for sample in passed:
             self._passed_ns = sample.sensor_ns
             # Handed on now, so that the order of reception is that of the file as well.
             self._received_ns = max(self._received_ns, sample.receive_ns)
@@ -51,3 +61,7 @@ class SampleOrder:
         """The device's time begins anew."""
         self.release()
         self._passed_ns = -1
+
+
+def _device_time(sample: Sample) -> int:
+    return sample.sensor_ns

@@ -53,6 +53,10 @@ def load_calibration(path: str) -> Calibration:
     if not path:
         return Calibration(_transforms(Frames()), "")
     file = Path(path).expanduser()
+    if not file.exists():
+        raise ConfigError(
+            f"calibration: {file}: no such file; correct the key, or leave it empty for the nominal geometry"
+        )
     frames = toml_table.convert(toml_table.read(file), Frames, str(file))
     for name, pose in msgspec.structs.asdict(frames).items():
         norm = sum(value * value for value in pose.rotation_xyzw)

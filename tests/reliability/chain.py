@@ -55,7 +55,7 @@ class Chain:
         payload: PayloadConfig | None = None,
     ) -> None:
         """recording, drivers: changes to the defaults. launcher: what runs the recorder, may be changed before
-        each start. faulty: the recorder with a disk and a clock that obey. payload: emulators that somebody else runs."""
+        each start. faulty: the recorder with a disk and a clock that obey. payload: emulators run elsewhere."""
         self.folder = folder
         self.sensors = tuple(sensors)
         self.recordings = folder / "recordings"

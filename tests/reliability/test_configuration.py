@@ -38,7 +38,10 @@ BROKEN = {
     "endpoint": ('[sensors.reach]\nendpoint = "usb"\n', "sensors.reach: "),
     "port": ("[live]\nport = 70000\n", "live.port: found 70000, expected a whole number <= 65535"),
     "topics": ('[topics]\nimu = "/livox/lidar"\n', "/livox/lidar"),
-    "calibration": ('calibration = "/nowhere/calibration.toml"\n', "/nowhere/calibration.toml: no such"),
+    "calibration": (
+        'calibration = "/nowhere/calibration.toml"\n',
+        "calibration: /nowhere/calibration.toml: no such file",
+    ),
     "socket": ('[control]\nsocket = "/proc/control.sock"\n', "cannot listen at /proc/control.sock"),
     "group": ('[control]\nsocket = "{folder}/control.sock"\ngroup = "nobodys"\n', "control.group: no group 'nobodys'"),
     "bytes": ("calibration = '\xff'\n".encode("latin-1"), "byte 15 is not UTF-8; save the file as UTF-8"),
