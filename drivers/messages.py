@@ -56,6 +56,20 @@ class FixQuality(IntEnum):
     SIMULATOR = 8
 
 
+QUALITY_NAMES: dict[FixQuality, str] = {
+    FixQuality.INVALID: "no fix",
+    FixQuality.SINGLE: "single",
+    FixQuality.DGPS: "DGPS",
+    FixQuality.PPP: "PPP",
+    FixQuality.RTK_FIXED: "RTK fixed",
+    FixQuality.RTK_FLOAT: "RTK float",
+    FixQuality.DEAD_RECKONING: "dead reckoning",
+    FixQuality.MANUAL: "manual",
+    FixQuality.SIMULATOR: "simulator",
+}
+"""Qualities for people."""
+
+
 @dataclass(frozen=True, slots=True)
 class GnssFix:
     """One GNSS epoch. Position is WGS 84, degrees and metres above the ellipsoid; NaN where there is no fix.

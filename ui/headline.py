@@ -11,19 +11,19 @@ from ui.faults import faults
 from ui.situation import Link, Situation
 from ui.tone import Tone, worst
 
-TODO = "Is the payload on? See: systemctl status mapforest-recorder"
+WHAT_TO_DO = "Is the payload on? See: systemctl status mapforest-recorder"
 
 
 @dataclass(frozen=True)
 class Headline:
-    """word and clock are drawn large; detail, news and todo are a line each below. news stands out in its own tone."""
+    """word and clock are drawn large; detail, news (in a tone of its own) and advice are a line each below."""
 
     word: str
     tone: Tone
     detail: str
     news: str = ""
     clock: str = ""
-    todo: str = ""
+    advice: str = ""
     news_tone: Tone = Tone.QUIET
 
 
@@ -59,7 +59,7 @@ def _out_of_contact(situation: Situation) -> Headline:
     detail = f"Trying again. {situation.link_problem}"
     if situation.link is Link.ONLINE:
         detail = f"The recorder is there, and silent for {units.age(situation.status_age_s)}."
-    return Headline("NO CONTACT", Tone.BAD, detail, last_seen(situation), todo=TODO)
+    return Headline("NO CONTACT", Tone.BAD, detail, last_seen(situation), advice=WHAT_TO_DO)
 
 
 def _recording(situation: Situation, status: Status) -> Headline:

@@ -7,7 +7,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from drivers.driver import SensorState
-from drivers.messages import FixQuality, GnssFix
+from drivers.messages import QUALITY_NAMES, FixQuality, GnssFix
 from drivers.reach.config import Config
 from drivers.reach.covariance import SOURCE_TABLE
 
@@ -18,18 +18,6 @@ FIRST_SENTENCE_S = 3.0
 DAMAGED_SHARE = 0.01
 LOW_RATE = 0.7
 RATE_WINDOW_NS = 5_000_000_000
-
-QUALITY_NAMES: dict[FixQuality, str] = {
-    FixQuality.INVALID: "no fix",
-    FixQuality.SINGLE: "single",
-    FixQuality.DGPS: "DGPS",
-    FixQuality.PPP: "PPP",
-    FixQuality.RTK_FIXED: "RTK fixed",
-    FixQuality.RTK_FLOAT: "RTK float",
-    FixQuality.DEAD_RECKONING: "dead reckoning",
-    FixQuality.MANUAL: "manual",
-    FixQuality.SIMULATOR: "simulator",
-}
 
 
 class Arrivals:

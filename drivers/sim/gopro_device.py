@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
+from drivers.sim.gopro_replies import Reply, accepted, refused
+
 FREEZE_S = 24.75
 """Picture without keep-alive."""
 BOOT_S = 4.0
@@ -36,14 +38,6 @@ class Quirks:
     webcam_ignores_settings: bool = True
     preview_survives_shutter: bool = False
     frozen_after_s: float = FREEZE_S
-
-
-@dataclass(frozen=True, slots=True)
-class Reply:
-    """HTTP status and body."""
-
-    code: int
-    body: bytes
 
 
 @dataclass(slots=True)
@@ -157,7 +151,7 @@ class Hero8:
         parts = [part for part in url.path.split("/") if part]
         match parts:
             case ["gp", "gpControl"]:
-                return _json({"version": 4.0, "schema_version": 5, "info": self._info()})
+                return accepted({"version": 4.0, "schema_version": 5, "info": self._info()})
             case ["gp", "gpControl", "status"]:
                 return Reply(200, self._status())
             case ["gp", "gpControl", *rest]:
@@ -165,7 +159,7 @@ class Hero8:
             case ["gp", "gpWebcam", call]:
                 return self._webcam(call, query, requester)
             case ["gp", "gpMediaList"]:
-                return _json({"id": "1", "media": [{"d": "100GOPRO", "fs": self._files()}]})
+                return accepted({"id": "1", "media": [{"d": "100GOPRO", "fs": self._files()}]})
         return Reply(404, b"{}")
 
     def _control(self, rest: list[str], url: SplitResult, query: dict[str, str], requester: str) -> Reply:
@@ -201,7 +195,7 @@ class Hero8:
     def _command(self, command: str, raw_query: str, query: dict[str, str]) -> Reply:
         path = f"/gp/gpControl/command/{command}"
         if self._busy() or (command == "shutter" and self._state.webcam):
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         match command:
             case "shutter":
                 return self._shutter(query.get("p") == "1", path, raw_query)
@@ -212,13 +206,13 @@ class Hero8:
             case "system/locate" | "system/sleep" | "storage/tag_moment":
                 pass
             case _:
-                return _error(path, raw_query)
+                return refused(path, raw_query)
         self._work()
         return Reply(200, b"{}\n")
 
     def _shutter(self, on: bool, path: str, raw_query: str) -> Reply:
         if on and (self.quirks.refuses_recording or self._state.group != 1000):
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         if on and not self.recording:
             self._state.recording_since_s = self._now()
         elif not on:
@@ -239,33 +233,33 @@ class Hero8:
     def _set_date(self, raw_query: str, path: str) -> Reply:
         pairs = raw_query.partition("p=")[2].split("%")[1:]
         if len(pairs) != 6 or any(len(pair) != 2 for pair in pairs):
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         try:
             year, *rest = (int(pair, 16) for pair in pairs)
             self._memory.clock = datetime(2000 + year, *rest)  # type: ignore[arg-type]
         except ValueError:
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         self._memory.clock_set_s = self._now()
         return Reply(200, b"{}\n")
 
     def _setting(self, key: str, value: str) -> Reply:
         if self._busy() or self.recording or key not in self._memory.settings or not value.isdecimal():
-            return _error(f"/gp/gpControl/setting/{key}/{value}", "")
+            return refused(f"/gp/gpControl/setting/{key}/{value}", "")
         if not (self._state.webcam and self.quirks.webcam_ignores_settings):
             self._memory.settings[key] = int(value)
         return Reply(200, b"{}\n")
 
     def _execute(self, path: str, raw_query: str, query: dict[str, str], requester: str) -> Reply:
         if query.get("a1") == "proto_v2" or query.get("p1") != "gpStream" or self._state.webcam:
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         if self.quirks.always_busy:
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         if query.get("c1") == "restart":
             self._stream_to(requester)
         elif query.get("c1") == "stop":
             self._state.stream_to = None
         else:
-            return _error(path, raw_query)
+            return refused(path, raw_query)
         return Reply(200, b'{"status":"0"}\n')
 
     def _stream_to(self, requester: str) -> None:
@@ -279,7 +273,7 @@ class Hero8:
                 state.webcam_starts += 1
                 if state.webcam_starts < self.quirks.webcam_starts or query.get("res", "12") not in {"4", "7", "12"}:
                     state.webcam = 1
-                    return _json({"status": 1, "error": 1})
+                    return accepted({"status": 1, "error": 1})
                 state.webcam = 2
                 self._stream_to(requester)
             case "STOP":
@@ -290,7 +284,7 @@ class Hero8:
                 pass
             case _:
                 return Reply(200, b"")
-        return _json({"status": state.webcam, "error": 0})
+        return accepted({"status": state.webcam, "error": 0})
 
     def _status(self) -> bytes:
         state, memory, now = self._state, self._memory, self._now()
@@ -316,20 +310,3 @@ class Hero8:
 
     def _files(self) -> list[dict[str, str]]:
         return [{"n": f"GH01{n + 1:04d}.MP4", "cre": "0", "mod": "0", "s": "0"} for n in range(self._memory.videos)]
-
-
-def _json(value: object) -> Reply:
-    return Reply(200, (json.dumps(value, indent=1) + "\n").encode())
-
-
-def _error(path: str, query: str) -> Reply:
-    body = {
-        "version": "2.0",
-        "path_info": path,
-        "query_string": query,
-        "error_code": -3,
-        "error_msg": "Error executing command",
-        "function": "gp_control_execute",
-        "line": 512,
-    }
-    return Reply(500, json.dumps(body, indent=1).encode())

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.sim import render_kernels as kernels
+from drivers.sim.background_kernels import paint_background
 from drivers.sim.camera import Camera
 from drivers.sim.forest import LITTER, SOIL
 from drivers.sim.scene import Boxes, Doubles, Foliage, Scene
@@ -76,7 +77,7 @@ class Renderer:
 
     def _paint_ground(self, view: tuple[npt.NDArray[np.generic], ...]) -> None:
         terrain, textures = self._scene.terrain, self._textures
-        kernels.paint_background(
+        paint_background(
             *view,
             terrain.height_m,
             *terrain.origin_m,

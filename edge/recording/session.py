@@ -44,6 +44,9 @@ __all__ = [
 ]
 _log = logging.getLogger(__name__)
 
+START_ROOM_BYTES = 4 << 20
+"""Above the reserve. A session that ended at the reserve gives 2 MiB back: that must not let the next one begin."""
+
 
 class SessionRecorder:
     """Writes one session: `offer` from any thread, one writer thread, one thread that finishes splits."""
@@ -141,7 +144,7 @@ class SessionRecorder:
         existing = next(place for place in (recordings, *recordings.absolute().parents) if place.exists())
         space = self._disk.space(existing)
         floor = floor_bytes(space, self._limits.min_free_mib, self._limits.min_free_percent)
-        if space.free_bytes < floor:
+        if space.free_bytes < floor + START_ROOM_BYTES:
             raise RecordingError(
                 f"{recordings}: {space.free_bytes >> 20} MiB free, {floor >> 20} MiB must stay free; copy recordings "
                 "off the card and delete them there, or lower recording.min_free_mib and recording.min_free_percent"

@@ -6,20 +6,8 @@ import math
 
 from drivers.clock import ClockState
 from drivers.driver import SensorHealth
-from drivers.messages import FixQuality, GnssFix
+from drivers.messages import QUALITY_NAMES, GnssFix
 from edge.control.messages import Clock, Gnss, Sensor, Stream
-
-QUALITY_NAMES = {
-    FixQuality.INVALID: "no fix",
-    FixQuality.SINGLE: "single",
-    FixQuality.DGPS: "DGPS",
-    FixQuality.PPP: "PPP",
-    FixQuality.RTK_FIXED: "RTK fixed",
-    FixQuality.RTK_FLOAT: "RTK float",
-    FixQuality.DEAD_RECKONING: "dead reckoning",
-    FixQuality.MANUAL: "manual",
-    FixQuality.SIMULATOR: "simulator",
-}
 
 
 def sensor_state(health: SensorHealth) -> Sensor:

@@ -7,23 +7,14 @@ import struct
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from drivers.messages import QUALITY_NAMES
 from edge.recording.chunk import ChunkDamaged, chunk_body, chunk_header
 from edge.recording.scan import HEADER_SIZE, RecordFile
 from edge.validation.index import FileIndex, Series
 from edge.validation.report import Finding, GnssShare, Level
 from edge.validation.told import Told
 
-_QUALITY_NAMES = {
-    "0": "no fix",
-    "1": "single",
-    "2": "differential",
-    "3": "PPP",
-    "4": "RTK fixed",
-    "5": "RTK float",
-    "6": "dead reckoning",
-    "7": "manual",
-    "8": "simulator",
-}
+_QUALITY_NAMES = {str(int(quality)): name for quality, name in QUALITY_NAMES.items()}
 _STATUS_NAMES = {-1: "no fix", 0: "fix", 1: "satellite-augmented fix", 2: "ground-augmented fix"}
 _NO_FIX = "no fix"
 _HEAD = 160

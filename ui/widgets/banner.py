@@ -35,10 +35,10 @@ class Banner(Vertical):
     def __init__(self) -> None:
         super().__init__()
         self._large = tuple(Line() for _ in range(ROWS))
-        self._detail, self._news, self._todo = Line(), Line(), Line()
+        self._detail, self._news, self._advice = Line(), Line(), Line()
 
     def compose(self) -> ComposeResult:
-        yield from (*self._large, self._detail, self._news, self._todo)
+        yield from (*self._large, self._detail, self._news, self._advice)
 
     def show(self, situation: Situation) -> None:
         shown = headline(situation)
@@ -50,8 +50,8 @@ class Banner(Vertical):
         self._detail.show(plain(fit(shown.detail, width)))
         own = shown.tone in (shown.news_tone, Tone.GOOD) or shown.news_tone in (Tone.QUIET, Tone.GOOD)
         self._news.show(((fit(shown.news, width), "" if own else shown.news_tone.badge),))
-        self._todo.show(plain(fit(shown.todo, width)))
-        self._todo.display = bool(shown.todo)
+        self._advice.show(plain(fit(shown.advice, width)))
+        self._advice.display = bool(shown.advice)
 
     def on_click(self, event: events.Click) -> None:
         event.stop()

@@ -4,7 +4,7 @@ import math
 
 from drivers.clock import ClockState
 from drivers.driver import SensorHealth, SensorState, StreamHealth
-from drivers.messages import FixQuality
+from drivers.messages import QUALITY_NAMES, FixQuality
 from edge.control.codec import decode, encode
 from edge.control.messages import Status
 from edge.recording.account import RecordingStatus, TopicDrops
@@ -12,7 +12,7 @@ from edge.recording.messages import DiagnosticStatus, Level
 from edge.service.diagnostics import SystemClock, diagnostics
 from edge.service.host import HostSample
 from edge.service.host_clock import Discipline
-from edge.service.states import QUALITY_NAMES, sensor_state
+from edge.service.states import sensor_state
 from tests.edge.service.test_control_server import HOST
 
 HEALTH = SensorHealth(
