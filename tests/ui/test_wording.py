@@ -61,7 +61,7 @@ def test_no_contact_says_why_what_was_so_and_what_to_do():
     assert (shown.word, shown.tone) == ("NO CONTACT", Tone.BAD)
     assert "Trying again. It hung up." in shown.detail
     assert "14 s ago: RECORDING 0:12:34" in shown.news
-    assert "systemctl" in shown.todo
+    assert "systemctl" in shown.advice
 
 
 def test_a_silent_recorder_is_no_contact_either():
