@@ -11,7 +11,7 @@ from pipeline.odometry import so3
 from pipeline.odometry.config import ImuConfig, MatchConfig
 from pipeline.odometry.propagation_kernels import propagate
 from pipeline.odometry.so3 import Doubles
-from pipeline.odometry.state import ATTITUDE, ERRORS, State, gravity_axes
+from pipeline.odometry.state import ATTITUDE, ERRORS, POSITION, State, gravity_axes
 
 POSE = slice(0, 6)
 
@@ -57,6 +57,7 @@ class Filter:
                 imu.accel_share,
                 imu.gyro_range_rad_s,
                 imu.accel_range_m_s2,
+                imu.longest_step_s,
             ]
         )
 
@@ -67,13 +68,16 @@ class Filter:
         self.state = State.from_flat(flat)
         return np.asarray(knots)
 
-    def update(self, match: Callable[[State], NormalEquations]) -> Update:
-        """Iterate to the state most likely under the prior and what `match` says of each guess."""
+    def update(self, match: Callable[[State, int], NormalEquations], more: int = 0) -> Update:
+        """Iterate to the state most likely under the prior and what `match` says of each guess (from iteration 1 on).
+
+        more: iterations beyond the configured ones, not cut short.
+        """
         prior, guess = self.state, self.state
         prior_information = np.linalg.inv(self.covariance)
         step, iteration, equations = np.zeros(ERRORS), 0, None
-        for iteration in range(1, self._match.iterations + 1):
-            equations = match(guess)
+        for iteration in range(1, self._match.iterations + more + 1):
+            equations = match(guess, iteration)
             moved = guess.minus(prior)
             jacobian = np.eye(ERRORS)
             jacobian[ATTITUDE, ATTITUDE] = so3.right_jacobian_inverse(moved[ATTITUDE])
@@ -84,10 +88,14 @@ class Filter:
             gradient[POSE] += equations.gradient
             step = -np.linalg.solve(information, gradient)
             guess = guess.plus(step)
-            if np.abs(step[:3]).max() < self._match.converged_rad and np.abs(step[3:6]).max() < self._match.converged_m:
+            if iteration > more and self._still(step):
                 break
         assert equations is not None
         covariance = np.linalg.inv(information)
         self.covariance = 0.5 * (covariance + covariance.T)
         self.state = guess.clamped(self._imu.gyro_bias_limit_rad_s, self._imu.accel_bias_limit_m_s2)
         return Update(equations, iteration, float(np.linalg.norm(step[3:6])))
+
+    def _still(self, step: Doubles) -> bool:
+        turned, moved = np.abs(step[ATTITUDE]).max(), np.abs(step[POSITION]).max()
+        return bool(turned < self._match.converged_rad and moved < self._match.converged_m)

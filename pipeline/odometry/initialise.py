@@ -1,14 +1,125 @@
-"""Start-up."""
-import numpy as np
-from pipeline.odometry.state import State, GRAVITY_M_S2
-from pipeline.odometry import so3
+"""The first state: at rest from gravity and the gyro's mean, in motion from the first scans against each other."""
 
-def at_rest(rows):
-    up = rows[:, 3:].mean(0)
-    up /= np.linalg.norm(up)
-    axis = np.cross(up, [0, 0, 1.0])
-    s = np.linalg.norm(axis)
-    rot = so3.exp(axis / max(s, 1e-12) * np.arctan2(s, up[2]))
-    state = State(rot, np.zeros(3), np.zeros(3), rows[:, :3].mean(0), np.zeros(3), np.array([0, 0, -GRAVITY_M_S2]))
-    sig = np.concatenate([[1e-4]*3, [1e-4]*3, [0.01]*3, [3e-4]*3, [0.1]*3, [0.012]*2])
-    return state, np.diag(sig**2)
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.messages import LidarScan
+from pipeline.odometry.config import OdometryConfig
+from pipeline.odometry.drift import level
+from pipeline.odometry.errors import StartRefused
+from pipeline.odometry.filter import Filter
+from pipeline.odometry.so3 import Doubles
+from pipeline.odometry.state import ERRORS, GRAVITY_M_S2, VELOCITY, State
+from pipeline.odometry.tracker import Tracker
+
+FORCE_SHARE = (0.8, 1.2)
+"""Mean specific force at start-up, as a share of gravity; beyond it the unit is wrong, or the payload falls."""
+SIGMAS = {"attitude": 1e-4, "position": 1e-4, "velocity": 0.01, "gyro": 3e-4, "accel": 0.1, "gravity": 0.012}
+MOVING = SIGMAS | {"velocity": 8.0, "gyro": 6e-3, "gravity": 0.15}
+
+
+def force_scale(imu: Doubles) -> float:
+    """What the readings (m, 7) must be multiplied with to be m/s^2: 1, or 9.80665 for a driver that gives g.
+
+    StartRefused when neither gives gravity.
+    """
+    size = float(np.linalg.norm(imu[:, 4:7].mean(axis=0)))
+    for scale in (1.0, GRAVITY_M_S2):
+        if FORCE_SHARE[0] < size * scale / GRAVITY_M_S2 < FORCE_SHARE[1]:
+            return scale
+    raise StartRefused(
+        f"the accelerometer shows {size:.2f} on average, neither about 9.8 (m/s^2) nor 1 (g): "
+        "check its unit and scale, or hold the payload still for a moment"
+    )
+
+
+def is_at_rest(imu: Doubles, config: OdometryConfig) -> bool:
+    """Whether nothing moves in a window (m, 7) in SI units."""
+    start = config.start
+    rate, force = imu[:, 1:4], imu[:, 4:7]
+    quiet = rate.std(axis=0).max() < start.rest_gyro_rad_s and force.std(axis=0).max() < start.rest_accel_m_s2
+    return bool(quiet and np.abs(rate.mean(axis=0)).max() < 0.5 * start.rest_gyro_rad_s)
+
+
+def start_at_rest(imu: Doubles, config: OdometryConfig) -> Filter:
+    """From a window (m, 7) at rest: `odom` is level and heads where the payload does.
+
+    An accelerometer bias cannot be told from tilt yet: it goes to gravity, wide open, and is found under way.
+    """
+    state = _upright(imu[:, 4:7].mean(axis=0), gyro_bias=imu[:, 1:4].mean(axis=0))
+    return Filter(state, _covariance(SIGMAS), config.imu, config.match)
+
+
+def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: OdometryConfig) -> Filter:
+    """The state at the start of the first of some consecutive scans; windows: the samples (m, 7) of each.
+
+    Passes over the same scans: each begins with the velocity and gravity that the one before ended up with, so that the
+    first scan is deskewed ever better. StartRefused when they do not agree with each other, with the reason.
+    """
+    force = np.concatenate([window[:, 4:7] for window in windows]).mean(axis=0)
+    state = _upright(force, gyro_bias=np.zeros(3))
+    moved, matched, tracker = 0.0, 1.0, None
+    for round_ in range(config.start.passes):
+        sigmas = MOVING if round_ == 0 else MOVING | {"velocity": 1.0}
+        tracker = Tracker(config, Filter(state, _covariance(sigmas), config.imu, config.match))
+        travelled, shares = np.zeros(3), []
+        for scan, window in zip(scans, windows, strict=True):
+            before = tracker.filter.state
+            found = tracker.track(scan, window).residuals
+            shares.append(found.matches / max(found.clusters, 1))
+            travelled += _gained(before, window, config)
+        end = tracker.filter.state
+        velocity = end.velocity_m_s - travelled
+        upright = level(end.gravity_m_s2)
+        again = State(
+            upright @ state.rotation,
+            np.zeros(3),
+            upright @ velocity,
+            end.gyro_bias,
+            state.accel_bias,
+            state.gravity_m_s2,
+        )
+        moved, matched = float(np.linalg.norm(again.velocity_m_s - state.velocity_m_s)), float(np.mean(shares[1:]))
+        state = again
+    assert tracker is not None
+    _accept(tracker, moved, matched, config)
+    sigmas = MOVING | {"velocity": 0.3, "gravity": 0.03, "gyro": 3e-3}
+    return Filter(state, _covariance(sigmas), config.imu, config.match)
+
+
+def _accept(tracker: Tracker, moved: float, matched: float, config: OdometryConfig) -> None:
+    sigma = float(np.sqrt(np.diag(tracker.filter.covariance)[VELOCITY].max()))
+    limit = config.start.velocity_sigma_m_s
+    if matched < config.match.least_share:
+        raise StartRefused(
+            f"only {matched:.0%} of a scan meets the scans before it: nothing solid in view, or moving too fast"
+        )
+    if sigma > limit or moved > limit:
+        raise StartRefused(
+            f"the velocity is not clear yet (sigma {sigma:.2f} m/s, still changing by {moved:.2f} m/s): "
+            "hold still, or move where there is more than open ground in view"
+        )
+
+
+def _upright(force: Doubles, gyro_bias: Doubles) -> State:
+    down = np.array([0.0, 0.0, -GRAVITY_M_S2])
+    rotation = level(-force)
+    heading = np.arctan2(rotation[1, 0], rotation[0, 0])
+    c, s = np.cos(-heading), np.sin(-heading)
+    ahead = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return State(ahead @ rotation, np.zeros(3), np.zeros(3), gyro_bias, np.zeros(3), down)
+
+
+def _covariance(sigmas: dict[str, float]) -> Doubles:
+    order = ("attitude", "position", "velocity", "gyro", "accel")
+    spread = np.concatenate([*(np.full(3, sigmas[name]) for name in order), np.full(2, sigmas["gravity"])])
+    return np.diag(spread**2)
+
+
+def _gained(before: State, window: Doubles, config: OdometryConfig) -> Doubles:
+    """Velocity gained over a window as the inertial samples have it, (3,) in `odom`."""
+    probe = Filter(before, np.eye(ERRORS), config.imu, config.match)
+    probe.propagate(window)
+    return probe.state.velocity_m_s - before.velocity_m_s
+

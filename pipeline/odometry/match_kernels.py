@@ -11,13 +11,9 @@ import math
 import numpy as np
 from numba import njit
 
-from pipeline.odometry.map_kernels import COUNT, MapArrays, derive, find, pack
+from pipeline.odometry.map_kernels import COUNT, MapArrays, derive, find, pack, side, SIDES
 from pipeline.odometry.so3 import Doubles
 
-WIDE = 1.0 / 16.0
-"""Variance of a direction, as a share of the squared voxel size, from which on it says nothing."""
-PRIOR = 1.0 / 36.0
-PRIOR_POINTS = 3.0
 
 
 @njit(cache=True, nogil=True)
@@ -27,11 +23,14 @@ def match(
     rotation: Doubles,
     position: Doubles,
     sizes: Doubles,
+    first_level: int,
     settings: Doubles,
 ) -> tuple[Doubles, Doubles, Doubles]:
     """A (6, 6), b (6,) of attitude (body) and position; numbers (4,): matches, sum of d^2, sum of weights, directions.
 
-    The update is -A^-1 b. settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas).
+    The update is -A^-1 b. Levels before `first_level` are left out.
+    settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas), widest direction and prior variance
+    as shares of the squared size, weight of the prior in points.
     """
     a, b, numbers = np.zeros((6, 6)), np.zeros(6), np.zeros(4)
     fewest, floor, huber, gate = settings[0], settings[1] ** 2, settings[2], settings[3] ** 2
@@ -43,10 +42,11 @@ def match(
         wy = rotation[1, 0] * qx + rotation[1, 1] * qy + rotation[1, 2] * qz + position[1]
         wz = rotation[2, 0] * qx + rotation[2, 1] * qy + rotation[2, 2] * qz + position[2]
         row, size = -1, 0.0
-        for level in range(len(sizes)):
+        sector = side(wx - position[0], wy - position[1])
+        for level in range(first_level, len(sizes)):
             size = sizes[level]
             scale = 1.0 / size
-            slot = find(voxels.keys, pack(math.floor(wx * scale), math.floor(wy * scale), math.floor(wz * scale), level))
+            slot = find(voxels.keys, pack(math.floor(wx * scale), math.floor(wy * scale), math.floor(wz * scale), sector + SIDES * level))
             if slot >= 0 and voxels.statistics[voxels.rows[slot], COUNT] >= fewest:
                 row = voxels.rows[slot]
                 break
@@ -54,10 +54,10 @@ def match(
             continue
         v, shape = voxels.statistics[row], voxels.shape[row]
         if v[COUNT] > 1.2 * shape[0]:
-            derive(shape, v, PRIOR * size * size, PRIOR_POINTS)
+            derive(shape, v, settings[5] * size * size, settings[6])
         rx, ry, rz = wx - v[1], wy - v[2], wz - v[3]
         share = 1.0 / c[0] + 1.0 / v[COUNT]
-        widest = WIDE * size * size
+        widest = settings[4] * size * size
         distance = 0.0
         for k in range(3):
             variance = shape[1 + k]

@@ -1,79 +1,283 @@
-"""LiDAR-inertial odometry: scans and inertial samples in, poses with covariance out."""
+"""LiDAR-inertial odometry: scans and inertial samples in, poses with covariance out.
+
+    odometry = LidarInertialOdometry(OdometryConfig())
+    odometry.offer_imu(sample)
+    odometry.offer_scan(scan)
+    for estimate in odometry.take():
+        ...
+"""
 
 from __future__ import annotations
 
-import bisect
+from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivers.messages import ImuSample, LidarScan
-from pipeline.odometry.cluster_kernels import cluster
 from pipeline.odometry.config import OdometryConfig
-from pipeline.odometry.deskew_kernels import deskew
-from pipeline.odometry.filter import Filter, NormalEquations
-from pipeline.odometry.initialise import at_rest
-from pipeline.odometry.match_kernels import match
+from pipeline.odometry.drift import Drift
+from pipeline.odometry.errors import StartRefused
+from pipeline.odometry.estimate import Odometry, Status
+from pipeline.odometry.filter import Filter
+from pipeline.odometry.imu_buffer import ImuBuffer
+from pipeline.odometry.initialise import force_scale, is_at_rest, start_at_rest, start_in_motion
 from pipeline.odometry.so3 import Doubles
-from pipeline.odometry.state import State
-from pipeline.odometry.voxel_map import VoxelMap
+from pipeline.odometry.state import ERRORS, POSITION, State
+from pipeline.odometry.tracker import Registration, Tracker
+
+SWEEP_NS = 100_000_000
+OVERLAP_NS = 20_000_000
+"""A scan may begin this much before the one before it ended; what is older was passed by."""
+WAIT_NS = 300_000_000
+"""Scans wait so long for inertial samples up to their end, then go on with what there is."""
+MOST_WAITING = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Since construction. late_imu: not used for being late, doubled or not finite; late_scans: for being too old."""
+
+    scans: int = 0
+    late_imu: int = 0
+    late_scans: int = 0
+    restarts: int = 0
+    refusals: int = 0
 
 
 class LidarInertialOdometry:
+    """Deterministic for a given order of calls. Not thread-safe: one thread offers and takes."""
+
     def __init__(self, config: OdometryConfig) -> None:
         self._config = config
-        self._map = VoxelMap(config.map)
-        self._imu = []
-        self._filter = None
-        self._time = 0
-        self._slots = np.empty(1 << 16, np.int64)
-        self._owners = np.empty(1 << 16, np.int32)
-        m = config.match
-        self._settings = np.array([m.fewest_points, m.floor_m, m.huber, m.gate])
-        self._turn = np.array(config.lidar_to_base)
-        self._lever = np.array(config.lidar_in_base_m)
-        self.ok = 0
+        self._imu = ImuBuffer()
+        self._waiting: deque[LidarScan] = deque()
+        self._tracker: Tracker | None = None
+        self._drift = Drift(config.drift)
+        self._force_scale = 1.0
+        self._time_ns = 0
+        self._base = _Base()
+        self._misfits = 0
+        self._counts = Counts()
+        self._note = ""
 
-    def offer_imu(self, s):
-        self._imu.append(s)
+    @property
+    def counts(self) -> Counts:
+        """What went by and what was lost."""
+        return replace(self._counts, late_imu=self._imu.late)
 
-    def process_scan(self, scan):
-        end = scan.stamp_ns + 100_000_000
-        if self._filter is None:
-            rows = np.array([[*s.angular_velocity, *s.linear_acceleration] for s in self._imu if s.stamp_ns <= end])
-            if len(rows) < 200:
-                return None
-            state, cov = at_rest(rows)
-            self._filter = Filter(state, cov, self._config.imu, self._config.match)
-            self._time = scan.stamp_ns
-        used = [s for s in self._imu if s.stamp_ns <= end]
-        stamps = np.array([s.stamp_ns for s in self._imu])
-        a = np.searchsorted(stamps, self._time, side="right") - 1
-        b = np.searchsorted(stamps, end)
-        part = self._imu[a:b + 1]
-        raw = np.array([[*s.angular_velocity, *s.linear_acceleration] for s in part])
-        t = (np.array([s.stamp_ns for s in part]) - scan.stamp_ns) * 1e-9
-        t0, t1 = (self._time - scan.stamp_ns) * 1e-9, (end - scan.stamp_ns) * 1e-9
-        inner = t[(t > t0) & (t < t1)]
-        tt = np.concatenate([[t0], inner, [t1]])
-        samples = np.column_stack([tt] + [np.interp(tt, t, raw[:, i]) for i in range(6)])
-        self._imu = self._imu[a:]
-        knots = self._filter.propagate(samples)
-        self._time = end
-        r2 = (scan.xyz_m**2).sum(1)
-        keep = (r2 > self._config.nearest_m**2) & (r2 < self._config.farthest_m**2) & (scan.tag & 0x0f == 0)
-        pts = deskew(scan.xyz_m[keep], scan.offset_ns[keep] * 1e-9, knots, self._turn, self._lever)
-        s = self._filter.state
-        c = cluster(pts, scan.reflectivity[keep], s.rotation, s.position_m, self._config.match.leaf_m, self._slots, self._owners)
-        self.clusters = len(c)
-        if len(self._map):
-            self.update = self._filter.update(lambda x: self._match(c, x))
-        s = self._filter.state
-        self._map.insert(c, s.rotation, s.position_m)
-        return s
+    @property
+    def refusal(self) -> str:
+        """Why there is no estimate yet, empty when there is."""
+        return self._note if self._tracker is None else ""
 
-    def _match(self, clusters, guess):
-        a, b, n = match(self._map.arrays, clusters, guess.rotation, guess.position_m, self._map.sizes, self._settings)
-        scale = min(1.0, self._config.match.effective / max(n[0], 1.0))
-        return NormalEquations(a * scale, b * scale, int(n[0]), n[1] / max(n[0], 1), n[2] / max(n[0], 1))
+    @property
+    def map_voxels(self) -> int:
+        """Voxels in use."""
+        return len(self._tracker.map) if self._tracker else 0
+
+    def offer_imu(self, sample: ImuSample) -> None:
+        """Any order within what has not been used yet."""
+        self._imu.add(sample)
+
+    def offer_scan(self, scan: LidarScan) -> None:
+        """Scans in any order; they are taken in order of time."""
+        at = len(self._waiting)
+        while at > 0 and self._waiting[at - 1].stamp_ns > scan.stamp_ns:
+            at -= 1
+        self._waiting.insert(at, scan)
+
+    def take(self, *, flush: bool = False) -> Iterator[Odometry]:
+        """Estimates of all scans whose inertial samples have come. flush: of all scans, come what may."""
+        while self._waiting and (flush or self._ready()):
+            if self._tracker is None and not self._start(flush=flush):
+                return
+            if self._waiting and (estimate := self.process_scan(self._waiting.popleft())):
+                yield estimate
+
+    def process_scan(self, scan: LidarScan) -> Odometry | None:
+        """One scan, after a start and in order; None for one that is too old."""
+        tracker = self._tracker
+        if tracker is None or scan.stamp_ns < self._time_ns - OVERLAP_NS:
+            self._counts = replace(self._counts, late_scans=self._counts.late_scans + 1)
+            return None
+        end_ns = max(_end_ns(scan), self._time_ns + 1)
+        imu = self._samples(self._time_ns, end_ns, scan.stamp_ns)
+        before = tracker.filter.state
+        found = tracker.track(scan, imu)
+        self._imu.taken(end_ns)
+        self._time_ns = end_ns
+        self._counts = replace(self._counts, scans=self._counts.scans + 1)
+        self._drift.move(tracker.filter.state.position_m - before.position_m, self._drift_factor(found))
+        gap_s = float(np.diff(imu[:, 0]).max())
+        estimate = self._estimate(end_ns, found, gap_s=gap_s, saturated=self._saturated(imu))
+        if reason := self._broken(found, gap_s):
+            self._break(reason, gap_s)
+        return estimate
+
+    def _ready(self) -> bool:
+        end_ns = _end_ns(self._waiting[0])
+        newest_ns = max(self._imu.newest_ns, self._waiting[-1].stamp_ns - WAIT_NS)
+        return newest_ns >= end_ns or len(self._waiting) > MOST_WAITING
+
+    def _samples(self, begin_ns: int, end_ns: int, zero_ns: int) -> Doubles:
+        rows = self._imu.between(begin_ns, end_ns, zero_ns)
+        rows[:, 4:7] *= self._force_scale
+        return rows
+
+    def _start(self, *, flush: bool) -> bool:
+        """Find a first state for the scans that wait; False while more data is needed."""
+        window_ns = int(self._config.start.window_s * 1e9)
+        begin_ns = self._waiting[0].stamp_ns
+        resting = self._imu.window(begin_ns - window_ns, begin_ns)
+        if len(resting) < 20 or resting[-1, 0] - resting[0, 0] < 0.8 * self._config.start.window_s:
+            resting = self._imu.window(begin_ns, begin_ns + window_ns)
+        try:
+            return self._start_on(resting, flush=flush)
+        except StartRefused as refused:
+            self._note = str(refused)
+            self._counts = replace(self._counts, refusals=self._counts.refusals + 1)
+            self._waiting.popleft()
+            return bool(self._waiting) and self._ready() and self._start(flush=flush)
+
+    def _start_on(self, imu: Doubles, *, flush: bool) -> bool:
+        if len(imu) < 20:
+            self._note = "no inertial samples yet" if len(imu) == 0 else "too few inertial samples yet"
+            if self._imu.newest_ns > self._waiting[0].stamp_ns + 2 * WAIT_NS or flush:
+                self._waiting.popleft()
+            return False
+        self._force_scale = force_scale(imu)
+        imu[:, 4:7] *= self._force_scale
+        first = self._waiting[0]
+        if is_at_rest(imu, self._config):
+            started = start_at_rest(imu, self._config)
+        else:
+            count = self._config.start.moving_scans
+            last = self._waiting[count - 1] if len(self._waiting) >= count else None
+            if last is None or self._imu.newest_ns < _end_ns(last):
+                self._note = f"in motion: {count} scans are needed to begin"
+                return False
+            started = self._moving([self._waiting[k] for k in range(count)])
+        self._tracker = Tracker(self._config, self._base.place(started))
+        self._time_ns = first.stamp_ns
+        return True
+
+    def _moving(self, scans: list[LidarScan]) -> Filter:
+        begins = [scans[0].stamp_ns, *(_end_ns(scan) for scan in scans[:-1])]
+        windows = [self._samples(b, _end_ns(s), s.stamp_ns) for b, s in zip(begins, scans, strict=True)]
+        return start_in_motion(scans, windows, self._config)
+
+    def _drift_factor(self, found: Registration) -> float:
+        seen = found.observability
+        return 3.0 if seen is None or seen.degenerate else 1.0
+
+    def _saturated(self, imu: Doubles) -> bool:
+        limits = self._config.imu
+        rate, force = np.abs(imu[:, 1:4]).max(), np.abs(imu[:, 4:7]).max()
+        return bool(rate > 0.99 * limits.gyro_range_rad_s or force > 0.99 * limits.accel_range_m_s2)
+
+    def _broken(self, found: Registration, gap_s: float) -> str:
+        """Why the state is not worth going on from; empty when it is."""
+        assert self._tracker is not None
+        fault, residuals = self._config.fault, found.residuals
+        fits = residuals.matches >= self._config.match.least_share * max(residuals.clusters, 1)
+        self._misfits = 0 if fits or residuals.clusters == 0 else self._misfits + 1
+        spread = np.sqrt(np.diag(self._tracker.filter.covariance)[POSITION].max())
+        speed = np.linalg.norm(self._tracker.filter.state.velocity_m_s)
+        if gap_s > fault.imu_gap_s:
+            return f"no inertial samples for {gap_s:.2f} s"
+        if self._misfits > fault.misfits:
+            return f"{self._misfits} scans in a row do not fit the map"
+        if spread > fault.lost_m or not np.isfinite(spread):
+            return f"position within the map is uncertain by {spread:.1f} m"
+        if speed > fault.fastest_m_s:
+            return f"speed of {speed:.0f} m/s"
+        return ""
+
+    def _break(self, reason: str, gap_s: float) -> None:
+        """Give the state up: the next scans start again from this pose, with a new map and an honest covariance."""
+        assert self._tracker is not None
+        state, covariance = self._tracker.filter.state, self._tracker.filter.covariance
+        speed = min(float(np.linalg.norm(state.velocity_m_s)), self._config.fault.fastest_m_s)
+        known = float(np.sqrt(max(np.trace(covariance[POSITION, POSITION]), 0.0)))
+        known = min(known, 1e3) if np.isfinite(known) else 1e3
+        self._drift.widen(known + (speed + 1.0) * max(gap_s, 0.5), 0.3 + 0.5 * min(gap_s, 5.0))
+        self._base = _Base.at(state, f"restarted: {reason}")
+        self._tracker, self._misfits, self._note = None, 0, f"restarting: {reason}"
+        self._counts = replace(self._counts, restarts=self._counts.restarts + 1)
+
+    def _estimate(self, stamp_ns: int, found: Registration, *, gap_s: float, saturated: bool) -> Odometry:
+        assert self._tracker is not None
+        state, covariance = self._tracker.filter.state, self._tracker.filter.covariance
+        whole = covariance[:9, :9].copy()
+        whole[:6, :6] = self._drift.add_to(whole[:6, :6], state.rotation)
+        seen, note = found.observability, self._base.say()
+        nothing = np.empty((0, 3))
+        return Odometry(
+            stamp_ns,
+            Status.RESTARTED if note else self._status(found),
+            state.rotation,
+            state.position_m,
+            state.velocity_m_s,
+            state.gyro_bias,
+            state.accel_bias,
+            state.gravity_m_s2,
+            whole,
+            covariance[:6, :6],
+            seen.weak_attitude if seen else nothing,
+            seen.weak_position if seen else nothing,
+            found.residuals,
+            found.cloud,
+            saturated,
+            gap_s if gap_s > self._config.imu.longest_step_s else 0.0,
+            note,
+        )
+
+    def _status(self, found: Registration) -> Status:
+        residuals = found.residuals
+        if residuals.matches < self._config.match.least_share * max(residuals.clusters, 1):
+            return Status.COASTING
+        degenerate = found.observability is not None and found.observability.degenerate
+        return Status.DEGENERATE if degenerate else Status.TRACKING
+
+
+class _Base:
+    """Where a (re)start hangs in `odom`: the origin at first, the last pose after a break."""
+
+    def __init__(self, state: State | None = None, note: str = "") -> None:
+        self._state = state
+        self._note = note
+
+    @classmethod
+    def at(cls, state: State, note: str) -> _Base:
+        return cls(state, note)
+
+    def say(self) -> str:
+        """What to tell with the first estimate; once."""
+        note, self._note = self._note, ""
+        return note
+
+    def place(self, started: Filter) -> Filter:
+        """A fresh start moved and turned, about the vertical, onto the last pose."""
+        if self._state is None:
+            return started
+        old, new = self._state, started.state
+        turn = old.rotation @ new.rotation.T
+        yaw = np.arctan2(turn[1, 0], turn[0, 0])
+        c, s = np.cos(yaw), np.sin(yaw)
+        about = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        started.state = replace(
+            new,
+            rotation=about @ new.rotation,
+            position_m=old.position_m if np.isfinite(old.position_m).all() else np.zeros(3),
+            velocity_m_s=about @ new.velocity_m_s,
+        )
+        spin = np.eye(ERRORS)
+        spin[6:9, 6:9] = about
+        started.covariance = spin @ started.covariance @ spin.T
+        return started
+
+
+def _end_ns(scan: LidarScan) -> int:
+    return scan.stamp_ns + (int(scan.offset_ns.max()) if len(scan.offset_ns) else SWEEP_NS)

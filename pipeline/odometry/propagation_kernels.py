@@ -11,6 +11,9 @@ KNOT = 22
 """Columns of a knot: time (s), rotation row by row, position, velocity, acceleration in odom, rate in the body."""
 CORRELATED_S = 0.1
 SATURATED_GYRO, SATURATED_ACCEL = 0.15, 1.5
+"""Densities (a root hertz) that are added where a reading is at the end of its range."""
+GAP_GYRO, GAP_ACCEL = 0.2, 2.0
+"""And where no reading is: a walker's motion over a silence."""
 
 
 @njit(cache=True, nogil=True)
@@ -19,7 +22,8 @@ def propagate(
 ) -> tuple[Doubles, Doubles, Doubles]:
     """State (24,), covariance (17, 17) and knots (m, KNOT) after the samples imu (m, 7): time (s), rate, force.
 
-    noise: gyro and accel densities, gyro and accel walks, shares of rate and acceleration, ranges of gyro and accel.
+    noise: gyro and accel densities, gyro and accel walks, shares of rate and acceleration, ranges of gyro and accel,
+    longest step (s) that is no gap.
     Rates and forces are taken as linear between samples. Formulas: FAST-LIO2, with trapezoids.
     """
     count = len(imu)
@@ -90,6 +94,9 @@ def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, sample: D
             gyro += SATURATED_GYRO**2
         if abs(sample[4 + i]) > 0.99 * noise[7]:
             accel += SATURATED_ACCEL**2
+    if dt > noise[8]:
+        gyro += GAP_GYRO**2
+        accel += GAP_ACCEL**2
     for i in range(3):
         p[i, i] += gyro * dt
         p[3 + i, 3 + i] += accel * dt**3 / 3.0
