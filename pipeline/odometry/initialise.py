@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from drivers.messages import LidarScan
 from pipeline.odometry.config import OdometryConfig
+from pipeline.odometry.deskew_kernels import deskew
 from pipeline.odometry.drift import level
 from pipeline.odometry.errors import StartRefused
 from pipeline.odometry.filter import Filter
+from pipeline.odometry.rough_velocity import rough_velocity
 from pipeline.odometry.so3 import Doubles
 from pipeline.odometry.state import ERRORS, GRAVITY_M_S2, VELOCITY, State
 from pipeline.odometry.tracker import Tracker
@@ -16,7 +20,7 @@ from pipeline.odometry.tracker import Tracker
 FORCE_SHARE = (0.8, 1.2)
 """Mean specific force at start-up, as a share of gravity; beyond it the unit is wrong, or the payload falls."""
 SIGMAS = {"attitude": 1e-4, "position": 1e-4, "velocity": 0.01, "gyro": 3e-4, "accel": 0.1, "gravity": 0.012}
-MOVING = SIGMAS | {"velocity": 8.0, "gyro": 6e-3, "gravity": 0.15}
+MOVING = SIGMAS | {"velocity": 1.0, "gyro": 6e-3, "gravity": 0.15}
 
 
 def force_scale(imu: Doubles) -> float:
@@ -59,18 +63,20 @@ def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: Odom
     """
     force = np.concatenate([window[:, 4:7] for window in windows]).mean(axis=0)
     state = _upright(force, gyro_bias=np.zeros(3))
+    clouds, times_s = _clouds(scans, windows, state, config)
+    state = replace(state, velocity_m_s=rough_velocity(clouds, times_s))
     moved, matched, tracker = 0.0, 1.0, None
-    for round_ in range(config.start.passes):
-        sigmas = MOVING if round_ == 0 else MOVING | {"velocity": 1.0}
-        tracker = Tracker(config, Filter(state, _covariance(sigmas), config.imu, config.match))
-        travelled, shares = np.zeros(3), []
+    for _ in range(config.start.passes):
+        tracker = Tracker(config, Filter(state, _covariance(MOVING), config.imu, config.match))
+        pushed, shares = np.zeros(3), []
         for scan, window in zip(scans, windows, strict=True):
             before = tracker.filter.state
             found = tracker.track(scan, window).residuals
             shares.append(found.matches / max(found.clusters, 1))
-            travelled += _gained(before, window, config)
+            pushed += _pushed(before, window, config)
         end = tracker.filter.state
-        velocity = end.velocity_m_s - travelled
+        took_s = sum(float(window[-1, 0] - window[0, 0]) for window in windows)
+        velocity = end.velocity_m_s - pushed - took_s * end.gravity_m_s2
         upright = level(end.gravity_m_s2)
         again = State(
             upright @ state.rotation,
@@ -86,6 +92,25 @@ def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: Odom
     _accept(tracker, moved, matched, config)
     sigmas = MOVING | {"velocity": 0.3, "gravity": 0.03, "gyro": 3e-3}
     return Filter(state, _covariance(sigmas), config.imu, config.match)
+
+
+def _clouds(
+    scans: list[LidarScan], windows: list[Doubles], state: State, config: OdometryConfig
+) -> tuple[list[Doubles], Doubles]:
+    """The scans turned to `odom` by the gyro alone, as if from one place, and their middle times (s)."""
+    clouds = []
+    for scan, window in zip(scans, windows, strict=True):
+        probe = Filter(replace(state, velocity_m_s=np.zeros(3)), np.eye(ERRORS), config.imu, config.match)
+        weightless = window.copy()
+        weightless[:, 4:7] = 0.0
+        knots = probe.propagate(weightless)
+        knots[:, 10:19] = 0.0
+        keep = np.linalg.norm(scan.xyz_m, axis=1) > config.nearest_m
+        turn, lever = np.array(config.lidar_to_base), np.array(config.lidar_in_base_m)
+        points = deskew(scan.xyz_m[keep], scan.offset_ns[keep] * 1e-9, knots, turn, lever)
+        state = replace(state, rotation=probe.state.rotation)
+        clouds.append(points @ state.rotation.T)
+    return clouds, np.array([scan.stamp_ns - scans[0].stamp_ns for scan in scans]) * 1e-9
 
 
 def _accept(tracker: Tracker, moved: float, matched: float, config: OdometryConfig) -> None:
@@ -117,9 +142,9 @@ def _covariance(sigmas: dict[str, float]) -> Doubles:
     return np.diag(spread**2)
 
 
-def _gained(before: State, window: Doubles, config: OdometryConfig) -> Doubles:
-    """Velocity gained over a window as the inertial samples have it, (3,) in `odom`."""
+def _pushed(before: State, window: Doubles, config: OdometryConfig) -> Doubles:
+    """Velocity (3,) in `odom` that the specific force alone, without gravity, gives over a window."""
     probe = Filter(before, np.eye(ERRORS), config.imu, config.match)
     probe.propagate(window)
-    return probe.state.velocity_m_s - before.velocity_m_s
-
+    took_s = float(window[-1, 0] - window[0, 0])
+    return probe.state.velocity_m_s - before.velocity_m_s - took_s * before.gravity_m_s2

@@ -93,7 +93,7 @@ class LidarInertialOdometry:
         while self._waiting and (flush or self._ready()):
             if self._tracker is None and not self._start(flush=flush):
                 return
-            if self._waiting and (estimate := self.process_scan(self._waiting.popleft())):
+            if estimate := self.process_scan(self._waiting.popleft()):
                 yield estimate
 
     def process_scan(self, scan: LidarScan) -> Odometry | None:
@@ -104,13 +104,13 @@ class LidarInertialOdometry:
             return None
         end_ns = max(_end_ns(scan), self._time_ns + 1)
         imu = self._samples(self._time_ns, end_ns, scan.stamp_ns)
+        gap_s = self._imu.gap_s(self._time_ns, end_ns)
         before = tracker.filter.state
         found = tracker.track(scan, imu)
         self._imu.taken(end_ns)
         self._time_ns = end_ns
         self._counts = replace(self._counts, scans=self._counts.scans + 1)
         self._drift.move(tracker.filter.state.position_m - before.position_m, self._drift_factor(found))
-        gap_s = float(np.diff(imu[:, 0]).max())
         estimate = self._estimate(end_ns, found, gap_s=gap_s, saturated=self._saturated(imu))
         if reason := self._broken(found, gap_s):
             self._break(reason, gap_s)
@@ -128,40 +128,46 @@ class LidarInertialOdometry:
 
     def _start(self, *, flush: bool) -> bool:
         """Find a first state for the scans that wait; False while more data is needed."""
-        window_ns = int(self._config.start.window_s * 1e9)
-        begin_ns = self._waiting[0].stamp_ns
-        resting = self._imu.window(begin_ns - window_ns, begin_ns)
-        if len(resting) < 20 or resting[-1, 0] - resting[0, 0] < 0.8 * self._config.start.window_s:
-            resting = self._imu.window(begin_ns, begin_ns + window_ns)
-        try:
-            return self._start_on(resting, flush=flush)
-        except StartRefused as refused:
-            self._note = str(refused)
-            self._counts = replace(self._counts, refusals=self._counts.refusals + 1)
-            self._waiting.popleft()
-            return bool(self._waiting) and self._ready() and self._start(flush=flush)
-
-    def _start_on(self, imu: Doubles, *, flush: bool) -> bool:
-        if len(imu) < 20:
-            self._note = "no inertial samples yet" if len(imu) == 0 else "too few inertial samples yet"
-            if self._imu.newest_ns > self._waiting[0].stamp_ns + 2 * WAIT_NS or flush:
+        while self._waiting and (flush or self._ready()):
+            first = self._waiting[0]
+            try:
+                started = self._first_state(first)
+            except StartRefused as refused:
+                self._counts = replace(self._counts, refusals=self._counts.refusals + 1)
+                self._note = str(refused)
                 self._waiting.popleft()
-            return False
-        self._force_scale = force_scale(imu)
-        imu[:, 4:7] *= self._force_scale
-        first = self._waiting[0]
-        if is_at_rest(imu, self._config):
-            started = start_at_rest(imu, self._config)
-        else:
-            count = self._config.start.moving_scans
-            last = self._waiting[count - 1] if len(self._waiting) >= count else None
-            if last is None or self._imu.newest_ns < _end_ns(last):
-                self._note = f"in motion: {count} scans are needed to begin"
+                continue
+            if started is None:
+                if flush:
+                    self._waiting.popleft()
+                    continue
                 return False
-            started = self._moving([self._waiting[k] for k in range(count)])
-        self._tracker = Tracker(self._config, self._base.place(started))
-        self._time_ns = first.stamp_ns
-        return True
+            self._tracker = Tracker(self._config, self._base.place(started))
+            self._time_ns = first.stamp_ns
+            return True
+        return False
+
+    def _first_state(self, first: LidarScan) -> Filter | None:
+        """At the start of a scan; None while more data is needed. StartRefused with what is missing."""
+        window_ns = int(self._config.start.window_s * 1e9)
+        if self._imu.gap_s(first.stamp_ns, _end_ns(first)) > 2.0 * self._config.imu.longest_step_s:
+            raise StartRefused("no inertial samples with this scan")
+        windows = [(first.stamp_ns - window_ns, first.stamp_ns), (first.stamp_ns, first.stamp_ns + window_ns)]
+        whole = [(a, b) for a, b in windows if self._imu.covers(a, b, self._config.imu.longest_step_s)]
+        for begin_ns, end_ns in whole:
+            imu = self._imu.window(begin_ns, end_ns)
+            self._force_scale = force_scale(imu)
+            imu[:, 4:7] *= self._force_scale
+            if is_at_rest(imu, self._config):
+                return start_at_rest(imu, self._config)
+        self._note = "in motion: a second of scans and inertial samples is needed to begin"
+        count = self._config.start.moving_scans
+        if not whole or len(self._waiting) < count or self._imu.newest_ns < _end_ns(self._waiting[count - 1]):
+            late = self._imu.newest_ns > first.stamp_ns + 2 * window_ns
+            if late and not whole:
+                raise StartRefused("the inertial samples with this scan have holes")
+            return None
+        return self._moving([self._waiting[k] for k in range(count)])
 
     def _moving(self, scans: list[LidarScan]) -> Filter:
         begins = [scans[0].stamp_ns, *(_end_ns(scan) for scan in scans[:-1])]

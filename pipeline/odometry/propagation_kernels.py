@@ -42,6 +42,8 @@ def propagate(
         after = rotation @ turn
         force = 0.5 * (imu[k, 4:7] + imu[k + 1, 4:7]) - accel_bias
         acceleration = 0.5 * (rotation @ (imu[k, 4:7] - accel_bias) + after @ (imu[k + 1, 4:7] - accel_bias)) + gravity
+        if dt > noise[8]:
+            acceleration[:] = 0.0  # nobody knows: the speed is kept
         _write(knots[k], imu[k, 0], rotation, position, velocity, acceleration, rate)
 
         half = rotation @ exp(0.5 * rate * dt)
