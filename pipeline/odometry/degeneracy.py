@@ -36,9 +36,7 @@ def observe(information: Doubles, config: DegeneracyConfig) -> Observability:
     """Judge the information (6, 6) of attitude, then position, of one scan."""
     attitude, turns = _directions(information, slice(0, 3), slice(3, 6))
     position, ways = _directions(information, slice(3, 6), slice(0, 3))
-    return Observability(
-        attitude, position, turns[attitude > config.attitude_rad], ways[position > config.position_m]
-    )
+    return Observability(attitude, position, turns[attitude > config.attitude_rad], ways[position > config.position_m])
 
 
 def damp(information: Doubles, gradient: Doubles, seen: Observability, share: float) -> tuple[Doubles, Doubles]:

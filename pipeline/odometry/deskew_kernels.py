@@ -10,9 +10,7 @@ from pipeline.odometry.so3 import Doubles
 
 
 @njit(cache=True, nogil=True)
-def deskew(
-    xyz: npt.NDArray[np.float32], time_s: Doubles, knots: Doubles, turn: Doubles, lever: Doubles
-) -> Doubles:
+def deskew(xyz: npt.NDArray[np.float32], time_s: Doubles, knots: Doubles, turn: Doubles, lever: Doubles) -> Doubles:
     """Points (n, 3) of the sensor, each at its own time (n,), in `base_link` at the last knot.
 
     turn (3, 3), lever (3,): sensor to base. Times before the first knot are taken at its motion; need not be sorted.

@@ -50,8 +50,7 @@ class Cloud:
 class Odometry:
     """`base_link` in `odom` at the end of a scan. `odom` starts level, with the first heading along x.
 
-    rotation (3, 3); position, velocity, biases (3,), SI. gravity_m_s2 (3,): down in `odom` as now known: the frame's
-    own tilt is what the accelerometer bias was at the start. covariance (9, 9): attitude (rad, body axes), position,
+    rotation (3, 3); position, velocity, biases (3,), SI. covariance (9, 9): attitude (rad, body axes), position,
     velocity (`odom` axes), of the whole way since the start. covariance_in_map (6, 6): against the map at hand only.
     weak_attitude, weak_position: (k, 3) rows, directions that this scan did not show (body and `odom` axes).
     """
@@ -63,7 +62,6 @@ class Odometry:
     velocity_m_s: Doubles
     gyro_bias: Doubles
     accel_bias: Doubles
-    gravity_m_s2: Doubles
     covariance: Doubles
     covariance_in_map: Doubles
     weak_attitude: Doubles

@@ -142,7 +142,10 @@ def insert(
         sector = side(mx - position[0], my - position[1])
         for level in range(len(sizes)):
             scale = 1.0 / sizes[level]
-            row = claim(voxels, pack(math.floor(mx * scale), math.floor(my * scale), math.floor(mz * scale), sector + SIDES * level))
+            row = claim(
+                voxels,
+                pack(math.floor(mx * scale), math.floor(my * scale), math.floor(mz * scale), sector + SIDES * level),
+            )
             if row < 0:
                 continue
             v = voxels.statistics[row]

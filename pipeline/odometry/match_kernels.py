@@ -11,9 +11,8 @@ import math
 import numpy as np
 from numba import njit
 
-from pipeline.odometry.map_kernels import COUNT, MapArrays, derive, find, pack, side, SIDES
+from pipeline.odometry.map_kernels import COUNT, SIDES, MapArrays, derive, find, pack, side
 from pipeline.odometry.so3 import Doubles
-
 
 
 @njit(cache=True, nogil=True)
@@ -46,7 +45,10 @@ def match(
         for level in range(first_level, len(sizes)):
             size = sizes[level]
             scale = 1.0 / size
-            slot = find(voxels.keys, pack(math.floor(wx * scale), math.floor(wy * scale), math.floor(wz * scale), sector + SIDES * level))
+            slot = find(
+                voxels.keys,
+                pack(math.floor(wx * scale), math.floor(wy * scale), math.floor(wz * scale), sector + SIDES * level),
+            )
             if slot >= 0 and voxels.statistics[voxels.rows[slot], COUNT] >= fewest:
                 row = voxels.rows[slot]
                 break

@@ -1,10 +1,10 @@
 """LiDAR-inertial odometry: scans and inertial samples in, poses with covariance out.
 
-    odometry = LidarInertialOdometry(OdometryConfig())
-    odometry.offer_imu(sample)
-    odometry.offer_scan(scan)
-    for estimate in odometry.take():
-        ...
+odometry = LidarInertialOdometry(OdometryConfig())
+odometry.offer_imu(sample)
+odometry.offer_scan(scan)
+for estimate in odometry.take():
+    ...
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ from pipeline.odometry.drift import Drift
 from pipeline.odometry.errors import StartRefused
 from pipeline.odometry.estimate import Odometry, Status
 from pipeline.odometry.filter import Filter
+from pipeline.odometry.footing import Footing
 from pipeline.odometry.imu_buffer import ImuBuffer
 from pipeline.odometry.initialise import force_scale, is_at_rest, start_at_rest, start_in_motion
 from pipeline.odometry.so3 import Doubles
-from pipeline.odometry.state import ERRORS, POSITION, State
+from pipeline.odometry.state import GRAVITY, POSITION, gravity_axes
 from pipeline.odometry.tracker import Registration, Tracker
+from pipeline.odometry.upright import Upright
 
 SWEEP_NS = 100_000_000
 OVERLAP_NS = 20_000_000
@@ -55,9 +57,10 @@ class LidarInertialOdometry:
         self._waiting: deque[LidarScan] = deque()
         self._tracker: Tracker | None = None
         self._drift = Drift(config.drift)
+        self._upright = Upright()
         self._force_scale = 1.0
         self._time_ns = 0
-        self._base = _Base()
+        self._footing = Footing()
         self._misfits = 0
         self._counts = Counts()
         self._note = ""
@@ -110,7 +113,9 @@ class LidarInertialOdometry:
         self._imu.taken(end_ns)
         self._time_ns = end_ns
         self._counts = replace(self._counts, scans=self._counts.scans + 1)
-        self._drift.move(tracker.filter.state.position_m - before.position_m, self._drift_factor(found))
+        self._upright.follow(tracker.filter.state)
+        step_m = self._upright.turn @ (tracker.filter.state.position_m - before.position_m)
+        self._drift.move(step_m, self._drift_factor(found))
         estimate = self._estimate(end_ns, found, gap_s=gap_s, saturated=self._saturated(imu))
         if reason := self._broken(found, gap_s):
             self._break(reason, gap_s)
@@ -142,7 +147,7 @@ class LidarInertialOdometry:
                     self._waiting.popleft()
                     continue
                 return False
-            self._tracker = Tracker(self._config, self._base.place(started))
+            self._tracker = Tracker(self._config, self._footing.place(started, first.stamp_ns))
             self._time_ns = first.stamp_ns
             return True
         return False
@@ -209,30 +214,36 @@ class LidarInertialOdometry:
         known = float(np.sqrt(max(np.trace(covariance[POSITION, POSITION]), 0.0)))
         known = min(known, 1e3) if np.isfinite(known) else 1e3
         self._drift.widen(known + (speed + 1.0) * max(gap_s, 0.5), 0.3 + 0.5 * min(gap_s, 5.0))
-        self._base = _Base.at(state, f"restarted: {reason}")
+        self._footing = Footing(state, self._time_ns, f"restarted: {reason}")
         self._tracker, self._misfits, self._note = None, 0, f"restarting: {reason}"
         self._counts = replace(self._counts, restarts=self._counts.restarts + 1)
 
     def _estimate(self, stamp_ns: int, found: Registration, *, gap_s: float, saturated: bool) -> Odometry:
         assert self._tracker is not None
         state, covariance = self._tracker.filter.state, self._tracker.filter.covariance
-        whole = covariance[:9, :9].copy()
-        whole[:6, :6] = self._drift.add_to(whole[:6, :6], state.rotation)
-        seen, note = found.observability, self._base.say()
+        turn = self._upright.turn
+        rotation = turn @ state.rotation
+        spin = np.eye(9)
+        spin[3:6, 3:6] = spin[6:9, 6:9] = turn
+        whole = spin @ covariance[:9, :9] @ spin.T
+        in_map = whole[:6, :6].copy()
+        tilt = state.rotation.T @ gravity_axes(state.gravity_m_s2)
+        whole[:3, :3] += tilt @ covariance[GRAVITY, GRAVITY] @ tilt.T
+        whole[:6, :6] = self._drift.add_to(whole[:6, :6], rotation)
+        seen, note = found.observability, self._footing.say()
         nothing = np.empty((0, 3))
         return Odometry(
             stamp_ns,
             Status.RESTARTED if note else self._status(found),
-            state.rotation,
-            state.position_m,
-            state.velocity_m_s,
+            rotation,
+            self._upright.position(state),
+            turn @ state.velocity_m_s,
             state.gyro_bias,
             state.accel_bias,
-            state.gravity_m_s2,
             whole,
-            covariance[:6, :6],
+            in_map,
             seen.weak_attitude if seen else nothing,
-            seen.weak_position if seen else nothing,
+            seen.weak_position @ turn.T if seen else nothing,
             found.residuals,
             found.cloud,
             saturated,
@@ -246,43 +257,6 @@ class LidarInertialOdometry:
             return Status.COASTING
         degenerate = found.observability is not None and found.observability.degenerate
         return Status.DEGENERATE if degenerate else Status.TRACKING
-
-
-class _Base:
-    """Where a (re)start hangs in `odom`: the origin at first, the last pose after a break."""
-
-    def __init__(self, state: State | None = None, note: str = "") -> None:
-        self._state = state
-        self._note = note
-
-    @classmethod
-    def at(cls, state: State, note: str) -> _Base:
-        return cls(state, note)
-
-    def say(self) -> str:
-        """What to tell with the first estimate; once."""
-        note, self._note = self._note, ""
-        return note
-
-    def place(self, started: Filter) -> Filter:
-        """A fresh start moved and turned, about the vertical, onto the last pose."""
-        if self._state is None:
-            return started
-        old, new = self._state, started.state
-        turn = old.rotation @ new.rotation.T
-        yaw = np.arctan2(turn[1, 0], turn[0, 0])
-        c, s = np.cos(yaw), np.sin(yaw)
-        about = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        started.state = replace(
-            new,
-            rotation=about @ new.rotation,
-            position_m=old.position_m if np.isfinite(old.position_m).all() else np.zeros(3),
-            velocity_m_s=about @ new.velocity_m_s,
-        )
-        spin = np.eye(ERRORS)
-        spin[6:9, 6:9] = about
-        started.covariance = spin @ started.covariance @ spin.T
-        return started
 
 
 def _end_ns(scan: LidarScan) -> int:

@@ -107,4 +107,3 @@ def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, sample: D
         p[6 + i, 6 + i] += accel * dt
         p[9 + i, 9 + i] += noise[2] ** 2 * dt
         p[12 + i, 12 + i] += noise[3] ** 2 * dt
-

@@ -92,9 +92,7 @@ class Tracker:
             nonlocal seen
             found = self._match(clusters, guess, coarse_only=iteration <= coarse_rounds)
             seen = observe(found.information, self._config.degeneracy)
-            information, gradient = damp(
-                found.information, found.gradient, seen, self._config.degeneracy.share_left
-            )
+            information, gradient = damp(found.information, found.gradient, seen, self._config.degeneracy.share_left)
             return NormalEquations(information, gradient, found.matches, found.squared, found.kept)
 
         update = self.filter.update(equations, coarse_rounds)

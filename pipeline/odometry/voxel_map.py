@@ -51,9 +51,7 @@ class VoxelMap:
     def insert(self, clusters: Doubles, rotation: Doubles, position: Doubles) -> None:
         """Take in the clusters of a scan, seen from a pose, and forget a little of what is far."""
         self._scan += 1
-        kernels.insert(
-            self._voxels, clusters, rotation, position, self._sizes, self._config.frozen_points, self._scan
-        )
+        kernels.insert(self._voxels, clusters, rotation, position, self._sizes, self._config.frozen_points, self._scan)
         full = len(self) / self._config.voxels_most
         grow = 0.98 if full > TIGHT else 1.01
         self._reach_m = min(max(self._reach_m * grow, LEAST_REACH_M), self._config.reach_m)
