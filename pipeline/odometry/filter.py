@@ -75,7 +75,8 @@ class Filter:
         """
         prior, guess = self.state, self.state
         prior_information = np.linalg.inv(self.covariance)
-        step, iteration, equations = np.zeros(ERRORS), 0, None
+        step: Doubles = np.zeros(ERRORS)
+        iteration, equations = 0, None
         for iteration in range(1, self._match.iterations + more + 1):
             equations = match(guess, iteration)
             moved = guess.minus(prior)
@@ -86,7 +87,7 @@ class Filter:
             information[POSE, POSE] += equations.information
             gradient = pulled @ moved
             gradient[POSE] += equations.gradient
-            step = -np.linalg.solve(information, gradient)
+            step = np.asarray(-np.linalg.solve(information, gradient), dtype=np.float64)
             guess = guess.plus(step)
             if iteration > more and self._still(step):
                 break

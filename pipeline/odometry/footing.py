@@ -27,7 +27,7 @@ class Footing:
         return note
 
     def place(self, started: Filter, stamp_ns: int) -> Filter:
-        """A fresh start, moved and turned about the vertical: the heading is kept, the way goes on at the mean speed."""
+        """A fresh start, moved and turned about the vertical: heading kept, the way gone at the mean speed."""
         old, new = self._state, started.state
         if old is None or not np.isfinite(old.flat()).all():
             return started

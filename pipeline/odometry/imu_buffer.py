@@ -48,9 +48,9 @@ class ImuBuffer:
         return self._table(begin_ns, first, last)
 
     def between(self, begin_ns: int, end_ns: int, zero_ns: int) -> Doubles:
-        """Samples (m, 7), m >= 2, from exactly `begin_ns` to `end_ns`, ends interpolated or held; seconds after zero_ns.
+        """Samples (m, 7), m >= 2, from exactly `begin_ns` to `end_ns`, ends interpolated or held.
 
-        Must not be called before a first sample came.
+        Times are seconds after `zero_ns`. Must not be called before a first sample came.
         """
         first = max(bisect.bisect_right(self._stamps, begin_ns) - 1, 0)
         last = min(bisect.bisect_left(self._stamps, end_ns) + 1, len(self._stamps))

@@ -64,7 +64,7 @@ def scatter_slot(key: int, mask: int) -> int:
     h ^= h >> np.uint64(33)
     h *= np.uint64(0xFF51AFD7ED558CCD)
     h ^= h >> np.uint64(33)
-    return np.int64(h & np.uint64(mask))
+    return int(h & np.uint64(mask))
 
 
 @njit(cache=True, nogil=True)

@@ -253,6 +253,8 @@ class LidarInertialOdometry:
 
     def _status(self, found: Registration) -> Status:
         residuals = found.residuals
+        if residuals.clusters > 0 and residuals.iterations == 0:
+            return Status.TRACKING  # the first scan is the map
         if residuals.matches < self._config.match.least_share * max(residuals.clusters, 1):
             return Status.COASTING
         degenerate = found.observability is not None and found.observability.degenerate

@@ -43,7 +43,7 @@ def rough_velocity(clouds: list[Doubles], times_s: Doubles) -> Doubles:
 
 def _cells(cloud: Doubles) -> np.ndarray[tuple[int, int], np.dtype[np.int32]]:
     """The cells (m, 3) that hold a point, each once."""
-    cells = np.floor((cloud + (HALF_M, HALF_M, HALF_UP_M)) / CELL_M).astype(np.int32)
+    cells = np.floor((cloud + np.array([HALF_M, HALF_M, HALF_UP_M])) / CELL_M).astype(np.int32)
     limit = (2 * int(HALF_M / CELL_M), 2 * int(HALF_M / CELL_M), 2 * int(HALF_UP_M / CELL_M))
     return np.unique(cells[((cells >= 0) & (cells < limit)).all(axis=1)], axis=0)
 

@@ -9,7 +9,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def votes(occupied: npt.NDArray[np.bool_], cells: npt.NDArray[np.int32], across: int, up: int) -> npt.NDArray[np.int32]:
-    """How many of the cells (n, 3) fall on occupied ones (x, y, z), for each shift: (2 across + 1,) * 2 + (2 up + 1,)."""
+    """How many of the cells (n, 3) fall on occupied ones, for each shift along x, y (-across..across), z (-up..up)."""
     out = np.zeros((2 * across + 1, 2 * across + 1, 2 * up + 1), np.int32)
     nx, ny, nz = occupied.shape
     for n in range(len(cells)):
