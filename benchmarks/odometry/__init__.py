@@ -1,0 +1,1 @@
+"""Odometry against its peers, on simulated walks whose truth is known."""

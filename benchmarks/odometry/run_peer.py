@@ -1,0 +1,117 @@
+"""One peer over one walk, in the peer's own environment. Needs numpy and the peer, nothing of this project.
+
+    python run_peer.py PEER INPUT.npz OUTPUT.npz THREADS
+
+INPUT: xyz (n, 3) float32, offset_s (n,) float32, ends (scans,), scan_s (scans,) start of each sweep, imu (m, 7) time,
+rate, force; lever (3,). OUTPUT: stamps_s (k,), position (k, 3), ms (k,), peak_mb, failed (a text, empty when it ended).
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+
+import numpy as np
+
+SWEEP_S = 0.1
+REST_SCANS = 10
+
+
+def main() -> None:
+    peer, source, target = sys.argv[1:4]
+    threads = int(sys.argv[4])
+    data = dict(np.load(source))
+    failed = ""
+    rows: list[tuple[float, float, float, float, float]] = []
+    try:
+        for row in PEERS[peer](data, threads):
+            rows.append(row)
+    except Exception as error:
+        failed = f"{type(error).__name__}: {error}"
+    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    np.savez(target, stamps_s=table[:, 0], position=table[:, 1:4], ms=table[:, 4], peak_mb=peak_mb, failed=failed)
+
+
+def _sweeps(data):
+    first = 0
+    for k, last in enumerate(data["ends"]):
+        yield float(data["scan_s"][k]), data["xyz"][first:last].astype(np.float64), data["offset_s"][first:last]
+        first = last
+
+
+def _rko(data, **settings):
+    from rko_lio.lio import LIO, LIOConfig  # noqa: PLC0415
+
+    lio = LIO(LIOConfig(**settings))
+    extrinsic = np.eye(4)
+    extrinsic[:3, 3] = data["lever"]
+    imu, used = data["imu"], 0
+    for start, xyz, offset in _sweeps(data):
+        end = start + SWEEP_S
+        begun = time.process_time()
+        while used < len(imu) and imu[used, 0] <= end + 1e-6:
+            lio.add_imu_measurement(imu[used, 4:7], imu[used, 1:4], round(imu[used, 0] * 1e9))
+            used += 1
+        stamps = np.round((start + offset.astype(np.float64)) * 1e9).astype(np.int64)
+        lio.register_scan(xyz, stamps, extrinsic_lidar2base=extrinsic)
+        took = 1e3 * (time.process_time() - begun)
+        times, poses = lio.poses_with_timestamps()
+        if len(times):
+            yield (float(times[-1]) * 1e-9, *np.asarray(poses[-1])[:3], took)
+
+
+def rko(data, threads):
+    return _rko(data, max_num_threads=threads, initialization_phase=True)
+
+
+def rko_fine(data, threads):
+    fine = {"voxel_size": 0.5, "double_downsample": False, "max_correspondence_distance": 0.3}
+    return _rko(data, max_num_threads=threads, initialization_phase=True, **fine)
+
+
+def genz(data, threads):
+    from pathlib import Path  # noqa: PLC0415
+
+    import genz_lio  # noqa: PLC0415
+    from genz_lio import GenZLIO, load_config  # noqa: PLC0415
+
+    config = load_config(str(Path(genz_lio.__file__).parent / "configs/default/mid360.yaml"))
+    config.max_threads = threads
+    config.mapping.extrinsic_t = data["lever"]
+    lio = GenZLIO(config)
+    imu, used = data["imu"], 0
+    for start, xyz, offset in _sweeps(data):
+        end = start + SWEEP_S
+        until = int(np.searchsorted(imu[:, 0], end + 1e-6))
+        part, used = imu[used:until], until
+        rows = np.column_stack([part[:, 0], part[:, 4:7], part[:, 1:4]])
+        begun = time.process_time()
+        result = lio.register_scan(xyz, start, end, rows, timestamps=offset.astype(np.float64))
+        took = 1e3 * (time.process_time() - begun)
+        pose = np.asarray(result.pose)
+        yield (end, *pose[:3, 3], took)
+
+
+def kiss(data, threads):
+    from kiss_icp.config import KISSConfig  # noqa: PLC0415
+    from kiss_icp.kiss_icp import KissICP  # noqa: PLC0415
+
+    config = KISSConfig()
+    config.mapping.voxel_size = 1.0
+    config.registration.max_num_threads = threads
+    odometry = KissICP(config)
+    for start, xyz, offset in _sweeps(data):
+        begun = time.process_time()
+        odometry.register_frame(xyz, offset / SWEEP_S)
+        took = 1e3 * (time.process_time() - begun)
+        # The sensor's own pose, at mid-sweep; the lever is put back so that base_link is compared.
+        pose = odometry.last_pose
+        yield (start + 0.5 * SWEEP_S, *(pose[:3, 3] - pose[:3, :3] @ data["lever"]), took)
+
+
+PEERS = {"rko_lio": rko, "rko_lio_fine": rko_fine, "genz_lio": genz, "kiss_icp": kiss}
+
+if __name__ == "__main__":
+    main()

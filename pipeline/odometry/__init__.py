@@ -1,0 +1,1 @@
+"""LiDAR-inertial odometry: an iterated error-state Kalman filter over a bounded voxel map."""

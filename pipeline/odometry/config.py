@@ -1,0 +1,124 @@
+"""Settings of the odometry. The defaults are for a Mid-360 in a forest; `docs/odometry.md` says what each gave."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+
+class ImuConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Noise of the inertial sensor, as it is under motion: densities are a root hertz, walks a root second."""
+
+    gyro_density_rad_s: float = 1.5e-4
+    accel_density_m_s2: float = 3e-3
+    gyro_walk_rad_s: float = 3e-5
+    accel_walk_m_s2: float = 3e-4
+    gyro_share: float = 3e-3
+    """Error of scale and alignment, as a share of the rate."""
+    accel_share: float = 3e-3
+    """The same, as a share of the acceleration without gravity."""
+    gyro_range_rad_s: float = math.radians(2000.0)
+    accel_range_m_s2: float = 4.0 * 9.80665
+    gyro_bias_limit_rad_s: float = 0.05
+    accel_bias_limit_m_s2: float = 0.8
+    longest_step_s: float = 0.05
+    """A longer silence is a gap: the motion within it is unknown."""
+
+
+class MapConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The voxel map: two grids, fine for stems, coarse for what is far and for recovery."""
+
+    fine_m: float = 0.3
+    coarse_m: float = 1.2
+    voxels_most: int = 400_000
+    frozen_points: int = 100
+    """A voxel takes in this many points, then keeps its shape: the map does not follow the drift."""
+    reach_m: float = 70.0
+    """What is farther from the sensor is forgotten."""
+
+
+class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Residuals of a scan against the map."""
+
+    leaf_m: float = 0.2
+    fewest_points: int = 6
+    floor_m: float = 0.015
+    """Error shared by all points of a cluster and its voxel: pose at insertion, deskewing, shape."""
+    huber: float = 1.5
+    gate: float = 6.0
+    wide: float = 0.025
+    """Variance, as a share of the squared voxel size, from which on a direction is the voxel's own and says nothing."""
+    prior: float = 0.0278
+    """Variance, likewise, that a voxel of few points is taken to have, with the weight of `prior_points`."""
+    prior_points: float = 3.0
+    effective: float = 300.0
+    """So many residuals a scan count as independent."""
+    least_share: float = 0.15
+    """Share of clusters that must meet a voxel, or the scan does not fit."""
+    wide_start_m: float = 0.15
+    """With a prior wider than this the first `coarse_rounds` use the coarse grid alone."""
+    coarse_rounds: int = 5
+    iterations: int = 4
+    converged_rad: float = 1e-4
+    converged_m: float = 5e-4
+
+
+class DegeneracyConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A direction is weak when the scan alone would leave it this uncertain; little of it is used then."""
+
+    attitude_rad: float = 0.02
+    position_m: float = 0.05
+    share_left: float = 0.1
+
+
+class DriftConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the map's own error grows with the way: shares of it, measured against the simulator's truth."""
+
+    yaw_deg_per_root_m: float = 0.004
+    horizontal: float = 0.0015
+    vertical: float = 0.001
+    correlated_m: float = 50.0
+
+
+class StartConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Start-up, at rest or in motion."""
+
+    window_s: float = 1.0
+    rest_gyro_rad_s: float = 0.02
+    """Standard deviation of the rate, and largest mean rate over twice that, of a payload at rest."""
+    rest_accel_m_s2: float = 0.15
+    moving_scans: int = 10
+    passes: int = 4
+    velocity_sigma_m_s: float = 0.5
+    """A start in motion is refused while the velocity is less certain than this."""
+
+
+class FaultConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """When to give up the state and start again."""
+
+    imu_gap_s: float = 0.5
+    """A longer silence of the inertial sensor: attitude and speed are gone."""
+    lost_m: float = 2.0
+    """Position against the map less certain than this."""
+    misfits: int = 20
+    """Scans in a row that do not fit the map."""
+    fastest_m_s: float = 60.0
+
+
+class OdometryConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All of it. lidar_in_base_m: origin of `livox_frame` in `base_link`, axes parallel."""
+
+    lidar_in_base_m: tuple[float, float, float] = (-0.011, -0.02329, 0.04412)
+    lidar_to_base: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    nearest_m: float = 0.5
+    farthest_m: float = 70.0
+    points_most: int = 24_000
+    """More points than this are thinned evenly in time: a slower machine sets less."""
+    imu: ImuConfig = ImuConfig()
+    map: MapConfig = MapConfig()
+    match: MatchConfig = MatchConfig()
+    degeneracy: DegeneracyConfig = DegeneracyConfig()
+    drift: DriftConfig = DriftConfig()
+    start: StartConfig = StartConfig()
+    fault: FaultConfig = FaultConfig()

@@ -1,0 +1,59 @@
+"""Error that a map built by its own poses cannot see: it grows with the way travelled.
+
+The filter's covariance is that of the pose within its map, and never grows. What is published adds the drift of the
+map itself: yaw and position walk at random with distance, and a yaw error swings all that comes after it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.odometry import so3
+from pipeline.odometry.config import DriftConfig
+from pipeline.odometry.so3 import Doubles
+
+
+class Drift:
+    """Covariance (4, 4) of yaw (rad) and position (m) of the map at the sensor, in `odom`."""
+
+    def __init__(self, config: DriftConfig) -> None:
+        self._config = config
+        self._covariance: Doubles = np.zeros((4, 4))
+
+    def move(self, step_m: Doubles, factor: float = 1.0) -> None:
+        """The sensor moved by (3,) in `odom`; factor widens the walk where the scan was degenerate."""
+        length = float(np.linalg.norm(step_m))
+        transition = np.eye(4)
+        transition[1, 0], transition[2, 0] = -step_m[1], step_m[0]
+        grown = transition @ self._covariance @ transition.T
+        config = self._config
+        # A share of the way that stays wrong over `correlated_m` is a walk of share^2 * correlated_m a metre.
+        share = factor**2 * length * config.correlated_m
+        grown[0, 0] += factor**2 * length * math.radians(config.yaw_deg_per_root_m) ** 2
+        grown[1, 1] += share * config.horizontal**2
+        grown[2, 2] += share * config.horizontal**2
+        grown[3, 3] += share * config.vertical**2
+        self._covariance = grown
+
+    def widen(self, position_m: float, yaw_rad: float) -> None:
+        """A break of the map: the new one hangs on the old one only so well."""
+        self._covariance += np.diag([yaw_rad**2, position_m**2, position_m**2, position_m**2])
+
+    def add_to(self, covariance: Doubles, rotation: Doubles) -> Doubles:
+        """The pose covariance (6, 6), attitude in the body frame and position in `odom`, with the drift."""
+        map_to_error = np.zeros((6, 4))
+        map_to_error[:3, 0] = rotation.T[:, 2]
+        map_to_error[3:, 1:] = np.eye(3)
+        return covariance + map_to_error @ self._covariance @ map_to_error.T
+
+
+def level(gravity: Doubles) -> Doubles:
+    """The rotation (3, 3) that stands `odom` upright again, given gravity as the filter sees it in `odom`."""
+    up = -gravity / np.linalg.norm(gravity)
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return np.eye(3)
+    return np.asarray(so3.exp(axis / sine * math.atan2(sine, float(up[2]))))
