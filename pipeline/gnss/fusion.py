@@ -1,0 +1,141 @@
+"""`map` -> `odom`, live: odometry and fixes in, as they come; the odometry itself is never touched."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from drivers.messages import GnssFix
+from pipeline.estimates import Array, GlobalPose, MapToOdom, OdometryEstimate
+from pipeline.gnss.belief import YAW, drift, turned
+from pipeline.gnss.config import FusionConfig
+from pipeline.gnss.geodesy import Datum
+from pipeline.gnss.history import History
+from pipeline.gnss.tracker import Sighting, Tracker
+from pipeline.gnss.trust import Trust, floored_m, usable
+from pipeline.gnss.yaw_search import YawSearch
+
+MOST_WAITING = 100
+UNKNOWN_YAW = np.pi
+"""One sigma, rad."""
+
+
+class GnssFusion:
+    """One odometry, one receiver. Not thread-safe. Deterministic in the order of the calls."""
+
+    def __init__(self, config: FusionConfig | None = None) -> None:
+        self.config = config or FusionConfig()
+        self.datum: Datum | None = None
+        self.fixes_used = 0
+        self.fixes_rejected = 0
+        self._history = History(self.config)
+        self._waiting: deque[GnssFix] = deque()
+        self._trust = Trust(self.config)
+        self._search = YawSearch(self.config)
+        self._tracker: Tracker | None = None
+        self._used_ns: int | None = None
+
+    def add_odometry(self, estimate: OdometryEstimate) -> None:
+        """In order of time."""
+        self._history.add(estimate)
+        while self._waiting and self._waiting[0].stamp_ns <= estimate.stamp_ns:
+            self._place(self._waiting.popleft())
+
+    def add_fix(self, fix: GnssFix) -> None:
+        """Any fix, whenever it comes: it is compared with the odometry at its own stamp."""
+        newest_ns = self._history.newest_ns
+        if not usable(fix):
+            self.fixes_rejected += fix.quality != 0
+        elif newest_ns is not None and fix.stamp_ns <= newest_ns:
+            self._place(fix)
+        else:
+            self._waiting.append(fix)
+            if len(self._waiting) > MOST_WAITING:
+                self._waiting.popleft()
+                self.fixes_rejected += 1
+
+    def state(self) -> MapToOdom | None:
+        """None before the first fix."""
+        if self.datum is None or not self._search.sightings:
+            return None
+        datum = (self.datum.latitude_deg, self.datum.longitude_deg, self.datum.height_m)
+        counts = (datum, self.fixes_used, self.fixes_rejected)
+        if self._tracker is None:
+            last = self._search.sightings[-1]
+            covariance = np.diag([*last.sigma_m**2, UNKNOWN_YAW**2])
+            return MapToOdom(
+                last.passage.stamp_ns, last.position_m - last.passage.antenna_m, 0.0, covariance, *counts, observable=False
+            )
+        belief, passage = self._tracker.belief, self._tracker.passage
+        yaw = float(belief.mean[YAW])
+        arm = turned(yaw, -passage.antenna_m)
+        jacobian = _levered(arm)
+        covariance = jacobian @ belief.covariance[:4, :4] @ jacobian.T
+        return MapToOdom(passage.stamp_ns, belief.mean[:3] + arm, yaw, covariance, *counts, observable=True)
+
+    def global_pose(self, estimate: OdometryEstimate) -> GlobalPose | None:
+        """An estimate of the odometry in `map`; None while the yaw is not known."""
+        if self._tracker is None:
+            return None
+        passage = self._history.at(estimate.stamp_ns)
+        way_m = 0.0 if passage is None else abs(passage.drift_way_m - self._tracker.passage.drift_way_m)
+        belief, seen_from = self._tracker.belief, self._tracker.passage.antenna_m
+        return pose_from(estimate, belief.mean, belief.covariance, seen_from, way_m * drift(self.config))
+
+    def _place(self, fix: GnssFix) -> None:
+        passage = self._history.at(fix.stamp_ns)
+        if passage is None:
+            self.fixes_rejected += 1
+            return
+        if self._used_ns is not None and abs(fix.stamp_ns - self._used_ns) < 1e9 * self.config.spacing_s:
+            return
+        self._used_ns = fix.stamp_ns
+        self.datum = self.datum or Datum(fix.latitude_deg, fix.longitude_deg, fix.height_m)
+        position = self.datum.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m)
+        self._take(Sighting(passage, position, floored_m(fix, self.config), fix.quality))
+
+    def _take(self, sighting: Sighting) -> None:
+        if self._tracker is not None:
+            used = self._tracker.follow(sighting).used
+            self.fixes_used += used
+            self.fixes_rejected += not used
+            return
+        self.fixes_used += 1
+        alignment = self._search.add(sighting)
+        if alignment is not None:
+            self._tracker = self._search.tracker(alignment, self._trust)
+
+
+def pose_from(estimate: OdometryEstimate, mean: Array, covariance: Array, seen_from_m: Array, drifted: Array) -> GlobalPose:
+    """An estimate in `map` by a belief (mean, covariance) whose antenna was at `seen_from_m` (3,) in `odom`.
+
+    drifted: (4,) variance of x, y, z, yaw that the odometry gathered in between.
+    """
+    yaw = float(mean[YAW])
+    arm = turned(yaw, estimate.position_m - seen_from_m)
+    turn = np.column_stack([turned(yaw, axis) for axis in np.eye(3)])
+    jacobian = _levered(arm)
+    placed = jacobian @ (covariance[:4, :4] + np.diag(drifted)) @ jacobian.T
+    rotation = turn @ estimate.rotation
+    full = np.zeros((6, 6))
+    full[:3, :3] = placed[:3, :3]
+    up = rotation[2]
+    # The yaw turns about up, which the body sees along `up`; roll and pitch are as good as the odometry says.
+    full[3:, 3:] = placed[3, 3] * np.outer(up, up) + _without(estimate.covariance[3:, 3:], up)
+    full[:3, 3:] = np.outer(placed[:3, 3], up)
+    full[3:, :3] = full[:3, 3:].T
+    return GlobalPose(estimate.stamp_ns, mean[:3] + arm, rotation, full)
+
+
+def _levered(arm: Array) -> Array:
+    """(4, 4) Jacobian of a point at `arm` (in `map`) from one whose x, y, z, yaw are known."""
+    jacobian = np.eye(4)
+    jacobian[0, 3], jacobian[1, 3] = -arm[1], arm[0]
+    return jacobian
+
+
+def _without(covariance: Array, axis: Array) -> Array:
+    """A covariance (3, 3) of rotation with what lies along `axis` (3,) taken out."""
+    keep = np.eye(3) - np.outer(axis, axis)
+    return np.asarray(keep @ covariance @ keep)
