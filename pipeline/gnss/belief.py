@@ -23,7 +23,7 @@ HORIZONTAL, UP = slice(0, 2), slice(2, 3)
 AXES = (HORIZONTAL, UP)
 HUBER_RATIO = (1.5, 1.0)
 GATE_RATIO = (1.0, 0.78)
-"""Of the horizontal and the vertical part: 10.8 and 13.8 are the 99.9 % of one and two degrees of freedom."""
+"""Of the horizontal and the vertical part: 13.8 and 10.8 are the 99.9 % of two degrees of freedom and of one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,48 +88,49 @@ def design(seen: Observation, config: FusionConfig) -> tuple[Array, Array]:
     return jacobian, (white * seen.sigma_m) ** 2
 
 
-def innovation_chi2(belief: Belief, seen: Observation, config: FusionConfig) -> tuple[float, float]:
-    """Normalised innovation squared, horizontal (2 degrees of freedom) and vertical (1)."""
+@dataclass(frozen=True, slots=True)
+class Innovation:
+    """Of a fix: value (3,), covariance (3, 3), Jacobian (3, 13), variances (3,) of the white part.
+
+    chi2: normalised square, horizontal (2 degrees of freedom) and vertical (1).
+    """
+
+    value: Array
+    covariance: Array
+    jacobian: Array
+    white: Array
+    chi2: tuple[float, float]
+
+
+def innovation(belief: Belief, seen: Observation, config: FusionConfig) -> Innovation:
+    """What the belief did not expect of a fix."""
     jacobian, white = design(seen, config)
-    innovation = seen.position_m - jacobian @ belief.mean
-    spread = jacobian @ belief.covariance @ jacobian.T + np.diag(white)
-    horizontal, up = (float(innovation[axes] @ np.linalg.solve(spread[axes, axes], innovation[axes])) for axes in AXES)
-    return horizontal, up
+    value = seen.position_m - jacobian @ belief.mean
+    spread = jacobian @ belief.covariance @ jacobian.T
+    spread[range(3), range(3)] += white
+    (a, b), (_, c) = spread[0, :2], spread[1, :2]
+    x, y, z = value
+    horizontal = (c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b)
+    return Innovation(value, spread, jacobian, white, (float(horizontal), float(z * z / spread[2, 2])))
 
 
-def corrected(belief: Belief, seen: Observation, weights: Array, config: FusionConfig) -> Belief:
-    """With a fix whose information is multiplied by `weights` (3,); 0 leaves an axis out. Joseph form."""
-    jacobian, white = design(seen, config)
-    used = weights > 0.0
-    if not used.any():
-        return belief
-    jacobian, noise = jacobian[used], np.diag(white[used] / weights[used])
-    spread = jacobian @ belief.covariance @ jacobian.T + noise
-    gain = np.linalg.solve(spread, jacobian @ belief.covariance).T
-    left = np.eye(SIZE) - gain @ jacobian
-    mean = belief.mean + gain @ (seen.position_m[used] - jacobian @ belief.mean)
-    return Belief(mean, left @ belief.covariance @ left.T + gain @ noise @ gain.T)
+def huber_weights(chi2: tuple[float, float], config: FusionConfig) -> Array:
+    """(3,) from the whitened innovation, horizontal and vertical apart."""
+    horizontal, up = (
+        min(1.0, ratio * config.huber / math.sqrt(value)) if value > 0.0 else 1.0
+        for ratio, value in zip(HUBER_RATIO, chi2, strict=True)
+    )
+    return np.array([horizontal, horizontal, up])
 
 
-def huber_weights(belief: Belief, seen: Observation, config: FusionConfig) -> Array:
-    """(3,) weights by the whitened residual of a belief that has seen the fix; horizontal and vertical apart."""
-    jacobian, white = design(seen, config)
-    residual = (seen.position_m - jacobian @ belief.mean) / np.sqrt(white)
-    weights = np.ones(3)
-    for axes, ratio in zip(AXES, HUBER_RATIO, strict=True):
-        size = float(np.linalg.norm(residual[axes]))
-        weights[axes] = min(1.0, ratio * config.huber / size) if size > 0.0 else 1.0
-    return weights
+def corrected(belief: Belief, new: Innovation, weights: Array) -> Belief:
+    """Moved by `weights` (3,) of what a squared loss would move it: the innovation's covariance over the weight.
 
-
-def robustly_corrected(belief: Belief, seen: Observation, allowed: Array, config: FusionConfig, rounds: int = 4) -> Belief:
-    """Iteratively reweighted: Huber loss on the fix, squared on the prior. allowed: (3,) 1 or 0 by axis."""
-    after = corrected(belief, seen, allowed, config)
-    if math.isinf(config.huber):
-        return after
-    for _ in range(rounds):
-        weights = huber_weights(after, seen, config)
-        if weights.min() == 1.0:
-            break
-        after = corrected(belief, seen, allowed * weights, config)
-    return after
+    Joseph form. The weight acts on the whole innovation: acting on the white part alone, the lasting error
+    would take up what the fix is off.
+    """
+    noise = new.white + np.diag(new.covariance) * (1.0 / weights - 1.0)
+    spread = new.covariance + np.diag(noise - new.white)
+    gain = np.linalg.solve(spread, new.jacobian @ belief.covariance).T
+    left = np.eye(SIZE) - gain @ new.jacobian
+    return Belief(belief.mean + gain @ new.value, left @ belief.covariance @ left.T + (gain * noise) @ gain.T)

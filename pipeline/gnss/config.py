@@ -20,7 +20,7 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     drift_m: NotNegative = 0.05
     """Horizontal drift of the odometry after one metre; it grows with the root of the way: 0.5 m after 100 m."""
     drift_up_m: NotNegative = 0.05
-    drift_yaw_deg: NotNegative = 0.05
+    drift_yaw_deg: NotNegative = 0.03
     degenerate_factor: Positive = 5.0
     """The drift is that many times larger where the odometry was degenerate or had a gap."""
 
@@ -45,7 +45,7 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Rejecting for so long, the filter doubts itself."""
 
     yaw_known_deg: Positive = 3.0
-    spacing_s: NotNegative = 0.0
-    """Fixes closer than that to the last used one are left out."""
+    spacing_s: NotNegative = 0.9
+    """Fixes closer than that to the last used one are left out: their errors are the same."""
     history_s: Positive = 30.0
     """How late a fix may come."""

@@ -10,10 +10,10 @@ from drivers.messages import GnssFix
 from pipeline.estimates import Array, GlobalPose, MapToOdom, OdometryEstimate
 from pipeline.gnss.belief import YAW, drift, turned
 from pipeline.gnss.config import FusionConfig
-from pipeline.gnss.geodesy import Datum
 from pipeline.gnss.history import History
-from pipeline.gnss.tracker import Sighting, Tracker
-from pipeline.gnss.trust import Trust, floored_m, usable
+from pipeline.gnss.sighting import Sighting, Sightings
+from pipeline.gnss.tracker import Tracker
+from pipeline.gnss.trust import Trust
 from pipeline.gnss.yaw_search import YawSearch
 
 MOST_WAITING = 100
@@ -26,15 +26,14 @@ class GnssFusion:
 
     def __init__(self, config: FusionConfig | None = None) -> None:
         self.config = config or FusionConfig()
-        self.datum: Datum | None = None
-        self.fixes_used = 0
-        self.fixes_rejected = 0
         self._history = History(self.config)
-        self._waiting: deque[GnssFix] = deque()
+        self._sightings = Sightings(self._history, self.config)
+        self._waiting: deque[GnssFix] = deque(maxlen=MOST_WAITING)
         self._trust = Trust(self.config)
         self._search = YawSearch(self.config)
         self._tracker: Tracker | None = None
-        self._used_ns: int | None = None
+        self._used = 0
+        self._gated = 0
 
     def add_odometry(self, estimate: OdometryEstimate) -> None:
         """In order of time."""
@@ -45,27 +44,28 @@ class GnssFusion:
     def add_fix(self, fix: GnssFix) -> None:
         """Any fix, whenever it comes: it is compared with the odometry at its own stamp."""
         newest_ns = self._history.newest_ns
-        if not usable(fix):
-            self.fixes_rejected += fix.quality != 0
-        elif newest_ns is not None and fix.stamp_ns <= newest_ns:
+        if newest_ns is not None and fix.stamp_ns <= newest_ns:
             self._place(fix)
         else:
             self._waiting.append(fix)
-            if len(self._waiting) > MOST_WAITING:
-                self._waiting.popleft()
-                self.fixes_rejected += 1
 
     def state(self) -> MapToOdom | None:
         """None before the first fix."""
-        if self.datum is None or not self._search.sightings:
+        datum = self._sightings.datum
+        if datum is None:
             return None
-        datum = (self.datum.latitude_deg, self.datum.longitude_deg, self.datum.height_m)
-        counts = (datum, self.fixes_used, self.fixes_rejected)
+        place = (datum.latitude_deg, datum.longitude_deg, datum.height_m)
+        counts = (place, self._used, self._gated + self._sightings.refused)
         if self._tracker is None:
             last = self._search.sightings[-1]
             covariance = np.diag([*last.sigma_m**2, UNKNOWN_YAW**2])
             return MapToOdom(
-                last.passage.stamp_ns, last.position_m - last.passage.antenna_m, 0.0, covariance, *counts, observable=False
+                last.passage.stamp_ns,
+                last.position_m - last.passage.antenna_m,
+                0.0,
+                covariance,
+                *counts,
+                observable=False,
             )
         belief, passage = self._tracker.belief, self._tracker.passage
         yaw = float(belief.mean[YAW])
@@ -84,30 +84,24 @@ class GnssFusion:
         return pose_from(estimate, belief.mean, belief.covariance, seen_from, way_m * drift(self.config))
 
     def _place(self, fix: GnssFix) -> None:
-        passage = self._history.at(fix.stamp_ns)
-        if passage is None:
-            self.fixes_rejected += 1
-            return
-        if self._used_ns is not None and abs(fix.stamp_ns - self._used_ns) < 1e9 * self.config.spacing_s:
-            return
-        self._used_ns = fix.stamp_ns
-        self.datum = self.datum or Datum(fix.latitude_deg, fix.longitude_deg, fix.height_m)
-        position = self.datum.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m)
-        self._take(Sighting(passage, position, floored_m(fix, self.config), fix.quality))
+        sighting = self._sightings.place(fix)
+        if sighting is not None:
+            used = self._take(sighting)
+            self._used += used
+            self._gated += not used
 
-    def _take(self, sighting: Sighting) -> None:
+    def _take(self, sighting: Sighting) -> bool:
         if self._tracker is not None:
-            used = self._tracker.follow(sighting).used
-            self.fixes_used += used
-            self.fixes_rejected += not used
-            return
-        self.fixes_used += 1
+            return self._tracker.follow(sighting).used
         alignment = self._search.add(sighting)
         if alignment is not None:
             self._tracker = self._search.tracker(alignment, self._trust)
+        return True
 
 
-def pose_from(estimate: OdometryEstimate, mean: Array, covariance: Array, seen_from_m: Array, drifted: Array) -> GlobalPose:
+def pose_from(
+    estimate: OdometryEstimate, mean: Array, covariance: Array, seen_from_m: Array, drifted: Array
+) -> GlobalPose:
     """An estimate in `map` by a belief (mean, covariance) whose antenna was at `seen_from_m` (3,) in `odom`.
 
     drifted: (4,) variance of x, y, z, yaw that the odometry gathered in between.

@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.gnss.alignment import Alignment, align
 from pipeline.gnss.config import FusionConfig
-from pipeline.gnss.tracker import Sighting, Tracker
+from pipeline.gnss.sighting import Sighting
+from pipeline.gnss.tracker import Tracker
 from pipeline.gnss.trust import Trust
 
 MOST = 400
