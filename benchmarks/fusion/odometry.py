@@ -26,11 +26,25 @@ class Drift:
     """Random walk, after one metre."""
 
 
-def drifted(trajectory: Trajectory, drift: Drift, seed: int) -> tuple[list[OdometryEstimate], Array]:
-    """Estimates at 10 Hz in an `odom` that begins at the true pose, levelled, with yaw 0; and true positions (n, 3).
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Estimates at 10 Hz, in an `odom` at the start of the walk with yaw 0 there.
 
-    `odom` lies at the start, turned by the yaw there.
+    truth_m: (n, 3) of `base_link` in the world. alone_m: (n,) error without GNSS, given the true pose at the start.
     """
+
+    estimates: list[OdometryEstimate]
+    truth_m: Array
+    alone_m: Array
+
+    @property
+    def end_error_m(self) -> float:
+        """What has drifted in the end."""
+        return float(self.alone_m[-1])
+
+
+def drifted(trajectory: Trajectory, drift: Drift, seed: int) -> Odometry:
+    """The odometry of a whole walk."""
     random = np.random.default_rng((seed, 77))
     stamps = np.arange(0, trajectory.duration_ns + 1, PERIOD_NS)
     truth, rotations = trajectory.poses(stamps)
@@ -60,7 +74,8 @@ def drifted(trajectory: Trajectory, drift: Drift, seed: int) -> tuple[list[Odome
         )
         for k, stamp in enumerate(stamps)
     ]
-    return estimates, truth
+    alone = odom @ _turns(yaw0).T + truth[0] - truth
+    return Odometry(estimates, truth, np.linalg.norm(alone, axis=1))
 
 
 def _lasting(length_m: Array, drift: Drift, random: np.random.Generator) -> Array:

@@ -1,9 +1,9 @@
 """The small filter: the antenna in `map`, the yaw of `odom`, and the lasting part of the receiver's error.
 
-State (13,): x, y, z (m) of the antenna in `map`; yaw (rad) of `odom` in `map`; the receiver's lasting error east, north,
-up (m), a Gauss-Markov process, for each kind of solution: fixed, float, other. Odometry moves the antenna; its drift is
-noise by the metre. Seen from the current place, not from the origin of `odom`, a drift in yaw does not throw the
-position about.
+State (13,): x, y, z (m) of the antenna in `map`; yaw (rad) of `odom` in `map`; the receiver's lasting error east,
+north, up (m), a Gauss-Markov process, for each kind of solution: fixed, float, other. Odometry moves the antenna; its
+drift is noise by the metre. Seen from the current place, not from the origin of `odom`, a drift in yaw does not throw
+the position about. Plain numpy: filterpy would bring matplotlib and 0.9 s of import for two matrix lines.
 """
 
 from __future__ import annotations
@@ -57,26 +57,20 @@ def started(position_m: Array, yaw: float, covariance: Array, lasting_m: Array) 
     return Belief(np.array([*position_m, yaw, *np.zeros(9)]), full)
 
 
-def moved(
-    belief: Belief, step_m: Array, drift_way_m: float, passed_s: float, lasting_m: Array, config: FusionConfig
-) -> tuple[Belief, Array]:
-    """After the odometry moved the antenna by `step_m` (3,) in `odom`; and the transition (13, 13)."""
+def moved(belief: Belief, step_m: Array, drifted: Array, keep: float, lasting_m: Array) -> tuple[Belief, Array]:
+    """After the odometry moved the antenna by `step_m` (3,) in `odom`; and the transition (13, 13).
+
+    drifted: (4,) variance of x, y, z, yaw gathered. keep: share of the lasting errors that lasted; lasting_m: (9,).
+    """
     mean = belief.mean.copy()
     step = turned(float(mean[YAW]), step_m)
-    keep = math.exp(-passed_s / config.correlation_s) if config.correlation_s else 0.0
     mean[:3] += step
     mean[4:] *= keep
     transition = np.diag([1.0, 1.0, 1.0, 1.0, *[keep] * 9])
     transition[0, YAW], transition[1, YAW] = -step[1], step[0]
     covariance = transition @ belief.covariance @ transition.T
-    covariance[DIAGONAL] += np.concatenate([drift(config) * drift_way_m, (1.0 - keep**2) * lasting_m**2])
+    covariance[DIAGONAL] += np.concatenate([drifted, (1.0 - keep**2) * lasting_m**2])
     return Belief(mean, covariance), transition
-
-
-def drift(config: FusionConfig) -> Array:
-    """(4,) variance of x, y, z, yaw a metre."""
-    sigma = (config.drift_m, config.drift_m, config.drift_up_m, math.radians(config.drift_yaw_deg))
-    return np.array(sigma) ** 2
 
 
 def design(seen: Observation, config: FusionConfig) -> tuple[Array, Array]:
@@ -121,6 +115,13 @@ def huber_weights(chi2: tuple[float, float], config: FusionConfig) -> Array:
         for ratio, value in zip(HUBER_RATIO, chi2, strict=True)
     )
     return np.array([horizontal, horizontal, up])
+
+
+def log_likelihood(new: Innovation, config: FusionConfig) -> float:
+    """Of an innovation, but for a constant; no less than at the gate, so that outliers do not decide."""
+    spread = new.covariance
+    horizontal = float(np.log(spread[0, 0] * spread[1, 1] - spread[0, 1] ** 2)) + min(new.chi2[0], config.gate)
+    return -0.5 * (horizontal + math.log(spread[2, 2]) + min(new.chi2[1], GATE_RATIO[1] * config.gate))
 
 
 def corrected(belief: Belief, new: Innovation, weights: Array) -> Belief:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import msgspec
+import numpy as np
+
+from pipeline.estimates import Array
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -21,6 +25,8 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Horizontal drift of the odometry after one metre; it grows with the root of the way: 0.5 m after 100 m."""
     drift_up_m: NotNegative = 0.05
     drift_yaw_deg: NotNegative = 0.03
+    drift_scales: tuple[float, ...] = (0.3, 1.0, 3.0)
+    """Multiples of these three that are tried side by side."""
     degenerate_factor: Positive = 5.0
     """The drift is that many times larger where the odometry was degenerate or had a gap."""
 
@@ -49,3 +55,12 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Fixes closer than that to the last used one are left out: their errors are the same."""
     history_s: Positive = 30.0
     """How late a fix may come."""
+
+    def drift(self) -> Array:
+        """(4,) variance of x, y, z, yaw a metre."""
+        return np.array([self.drift_m, self.drift_m, self.drift_up_m, math.radians(self.drift_yaw_deg)]) ** 2
+
+    def scaled(self, scale: float) -> FusionConfig:
+        """The same with another drift."""
+        drift_m, up_m, yaw_deg = self.drift_m * scale, self.drift_up_m * scale, self.drift_yaw_deg * scale
+        return msgspec.structs.replace(self, drift_m=drift_m, drift_up_m=up_m, drift_yaw_deg=yaw_deg)

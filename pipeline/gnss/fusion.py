@@ -8,12 +8,11 @@ import numpy as np
 
 from drivers.messages import GnssFix
 from pipeline.estimates import Array, GlobalPose, MapToOdom, OdometryEstimate
-from pipeline.gnss.belief import YAW, drift, turned
+from pipeline.gnss.bank import Bank
+from pipeline.gnss.belief import YAW, turned
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.history import History
 from pipeline.gnss.sighting import Sighting, Sightings
-from pipeline.gnss.tracker import Tracker
-from pipeline.gnss.trust import Trust
 from pipeline.gnss.yaw_search import YawSearch
 
 MOST_WAITING = 100
@@ -29,9 +28,8 @@ class GnssFusion:
         self._history = History(self.config)
         self._sightings = Sightings(self._history, self.config)
         self._waiting: deque[GnssFix] = deque(maxlen=MOST_WAITING)
-        self._trust = Trust(self.config)
         self._search = YawSearch(self.config)
-        self._tracker: Tracker | None = None
+        self._bank: Bank | None = None
         self._used = 0
         self._gated = 0
 
@@ -56,7 +54,7 @@ class GnssFusion:
             return None
         place = (datum.latitude_deg, datum.longitude_deg, datum.height_m)
         counts = (place, self._used, self._gated + self._sightings.refused)
-        if self._tracker is None:
+        if self._bank is None:
             last = self._search.sightings[-1]
             covariance = np.diag([*last.sigma_m**2, UNKNOWN_YAW**2])
             return MapToOdom(
@@ -67,7 +65,7 @@ class GnssFusion:
                 *counts,
                 observable=False,
             )
-        belief, passage = self._tracker.belief, self._tracker.passage
+        belief, passage = self._bank.belief, self._bank.passage
         yaw = float(belief.mean[YAW])
         arm = turned(yaw, -passage.antenna_m)
         jacobian = _levered(arm)
@@ -76,12 +74,12 @@ class GnssFusion:
 
     def global_pose(self, estimate: OdometryEstimate) -> GlobalPose | None:
         """An estimate of the odometry in `map`; None while the yaw is not known."""
-        if self._tracker is None:
+        if self._bank is None:
             return None
         passage = self._history.at(estimate.stamp_ns)
-        way_m = 0.0 if passage is None else abs(passage.drift_way_m - self._tracker.passage.drift_way_m)
-        belief, seen_from = self._tracker.belief, self._tracker.passage.antenna_m
-        return pose_from(estimate, belief.mean, belief.covariance, seen_from, way_m * drift(self.config))
+        way_m = 0.0 if passage is None else abs(passage.drift_way_m - self._bank.passage.drift_way_m)
+        belief, seen_from = self._bank.belief, self._bank.passage.antenna_m
+        return pose_from(estimate, belief.mean, belief.covariance, seen_from, way_m * self._bank.drift)
 
     def _place(self, fix: GnssFix) -> None:
         sighting = self._sightings.place(fix)
@@ -91,11 +89,11 @@ class GnssFusion:
             self._gated += not used
 
     def _take(self, sighting: Sighting) -> bool:
-        if self._tracker is not None:
-            return self._tracker.follow(sighting).used
+        if self._bank is not None:
+            return self._bank.follow(sighting)
         alignment = self._search.add(sighting)
         if alignment is not None:
-            self._tracker = self._search.tracker(alignment, self._trust)
+            self._bank = self._search.bank(alignment)
         return True
 
 

@@ -12,15 +12,15 @@ import numpy as np
 from drivers.messages import GnssFix
 from pipeline.estimates import Array, GlobalPose, OdometryEstimate
 from pipeline.gnss.alignment import Alignment
-from pipeline.gnss.belief import YAW, Belief, drift
+from pipeline.gnss.bank import trackers
+from pipeline.gnss.belief import YAW, Belief
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.fusion import pose_from
 from pipeline.gnss.geodesy import Datum
 from pipeline.gnss.history import History
 from pipeline.gnss.sighting import Sighting, Sightings
-from pipeline.gnss.tracker import Step, Tracker
-from pipeline.gnss.trust import Trust
-from pipeline.gnss.yaw_search import WIDENED, YawSearch
+from pipeline.gnss.tracker import Step
+from pipeline.gnss.yaw_search import YawSearch
 
 PASSES = 2
 """The second begins where the first ended up, so that its gate is right from the first fix on."""
@@ -38,11 +38,11 @@ class Knot:
 class SmoothedDrift:
     """Where `odom` lay in `map` all along the session."""
 
-    def __init__(self, knots: list[Knot], history: History, datum: Datum, config: FusionConfig) -> None:
+    def __init__(self, knots: list[Knot], history: History, datum: Datum, drift: Array) -> None:
         self.knots = knots
         self.datum = datum
         self._history = history
-        self._drift = drift(config)
+        self._drift = drift
         self._stamps = [knot.sighting.passage.stamp_ns for knot in knots]
 
     def pose(self, estimate: OdometryEstimate) -> GlobalPose:
@@ -80,12 +80,15 @@ def smooth(
     alignment = next((found for found in map(search.add, sightings) if found is not None), None)
     if alignment is None or placing.datum is None:
         return None
-    trust = Trust(config)
     for _ in range(PASSES):
-        tracker = Tracker(alignment, sightings[0].passage, WIDENED, trust, config)
-        knots = backwards([tracker.follow(sighting) for sighting in sightings])
+        runs = [
+            (tracker.drift, [tracker.follow(sighting) for sighting in sightings])
+            for tracker in trackers(alignment, sightings[0].passage, config)
+        ]
+        drift, steps = max(runs, key=lambda run: sum(step.log_likelihood for step in run[1]))
+        knots = backwards(steps)
         alignment = _restart(knots[0])
-    return SmoothedDrift(knots, history, placing.datum, config)
+    return SmoothedDrift(knots, history, placing.datum, drift)
 
 
 def backwards(steps: list[Step]) -> list[Knot]:

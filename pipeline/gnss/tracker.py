@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pipeline.estimates import Array
 from pipeline.gnss import belief as small
 from pipeline.gnss.alignment import Alignment
-from pipeline.gnss.belief import GATE_RATIO, Belief, Innovation, Observation
+from pipeline.gnss.belief import GATE_RATIO, Belief, Innovation
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.history import Passage
 from pipeline.gnss.sighting import Sighting
@@ -25,9 +26,9 @@ class Step:
     sighting: Sighting
     transition: Array
     predicted: Belief
-    seen: Observation
-    used: bool
     after: Belief
+    used: bool
+    log_likelihood: float
 
 
 class Tracker:
@@ -39,6 +40,7 @@ class Tracker:
         covariance = widened**2 * alignment.covariance_at(first.antenna_m)
         self.belief = small.started(alignment.to_map(first.antenna_m), alignment.yaw, covariance, trust.lasting_m)
         self.passage = first
+        self.drift = config.drift()
         self._trust = trust
         self._config = config
         self._rejected_ns: list[int] = []
@@ -46,20 +48,22 @@ class Tracker:
     def follow(self, sighting: Sighting) -> Step:
         """Sightings come in order; one from before the last is taken as of its place."""
         config, passage = self._config, sighting.passage
-        way_m = abs(passage.drift_way_m - self.passage.drift_way_m)
+        drifted = self.drift * abs(passage.drift_way_m - self.passage.drift_way_m)
         passed_s = max(passage.stamp_ns - self.passage.stamp_ns, 0) / 1e9
+        keep = math.exp(-passed_s / config.correlation_s) if config.correlation_s else 0.0
         step_m = passage.antenna_m - self.passage.antenna_m
         seen = self._trust.observation(sighting.position_m, sighting.sigma_m, sighting.quality)
-        predicted, transition = small.moved(self.belief, step_m, way_m, passed_s, self._trust.lasting_m, config)
+        predicted, transition = small.moved(self.belief, step_m, drifted, keep, self._trust.lasting_m)
         new = small.innovation(predicted, seen, config)
         self._trust.learn(seen.kind, passage.stamp_ns, new.chi2[0])
+        log_likelihood = small.log_likelihood(new, config)
         used = self._gated(new, passage.stamp_ns)
         if used and not self._plausible(new):
             predicted = _doubting(predicted, new)
             new = small.innovation(predicted, seen, config)
         after = small.corrected(predicted, new, small.huber_weights(new.chi2, config)) if used else predicted
         self.belief, self.passage = after, passage
-        return Step(sighting, transition, predicted, seen, used, after)
+        return Step(sighting, transition, predicted, after, used, log_likelihood)
 
     def _plausible(self, new: Innovation) -> bool:
         return all(value <= ratio * self._config.gate for value, ratio in zip(new.chi2, GATE_RATIO, strict=True))

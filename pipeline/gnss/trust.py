@@ -39,7 +39,7 @@ class Trust:
         kind = KINDS.get(quality, OTHER)
         sigma = self._scale[kind] * floored_m
         white = self._config.white_share if self._config.correlation_s else 1.0
-        self.lasting_m[3 * kind : 3 * kind + 3] = math.sqrt(1.0 - white**2) * sigma
+        self.lasting_m[3 * kind : 3 * kind + 3] = math.sqrt(max(1.0 - white**2, 1e-6)) * sigma
         return Observation(position_m, sigma, kind)
 
     def learn(self, kind: int, stamp_ns: int, chi2: float) -> None:

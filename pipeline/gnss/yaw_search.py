@@ -7,16 +7,13 @@ import math
 import numpy as np
 
 from pipeline.gnss.alignment import Alignment, align
+from pipeline.gnss.bank import Bank
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.sighting import Sighting
-from pipeline.gnss.tracker import Tracker
-from pipeline.gnss.trust import Trust
 
 MOST = 400
 """Sightings kept; beyond, every second one is let go."""
 FEWEST = 8
-WIDENED = 3.0
-"""The alignment's sigmas are taken that many times larger as prior of the filter, which sees the same fixes again."""
 
 
 class YawSearch:
@@ -54,9 +51,9 @@ class YawSearch:
             np.clip(share, 1e-3, 1.0),
         )
 
-    def tracker(self, alignment: Alignment, trust: Trust) -> Tracker:
-        """A filter that has followed all sightings so far."""
-        tracker = Tracker(alignment, self.sightings[0].passage, WIDENED, trust, self._config)
+    def bank(self, alignment: Alignment) -> Bank:
+        """The filters, having followed all sightings so far."""
+        bank = Bank(alignment, self.sightings[0].passage, self._config)
         for sighting in self.sightings:
-            tracker.follow(sighting)
-        return tracker
+            bank.follow(sighting)
+        return bank
