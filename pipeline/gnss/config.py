@@ -12,7 +12,6 @@ from pipeline.estimates import Array
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
-Count = Annotated[int, msgspec.Meta(gt=0)]
 
 
 class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,15 +39,15 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     constant_sigma_m: NotNegative = 0.0
     """Not 0: taken for every fix instead of what the receiver says (a baseline)."""
     learning_rate: NotNegative = 0.02
-    """By how much a fix changes the logarithm of the scale learned for the sigmas of its quality."""
+    """By how much a second of fixes changes the logarithm of the scale learned for the sigmas of their quality."""
     most_dishonest: Positive = 10.0
 
     huber: Positive = 1.345
     """Vertical; horizontally 1.5 times that: the same efficiency of 95 % in two dimensions."""
     gate: Positive = 13.8
     """Chi-square of a horizontal innovation (99.9 %); vertically 0.78 of it."""
-    recover_s: Positive = 30.0
-    """Rejecting for so long, the filter doubts itself."""
+    recover_s: Positive = 45.0
+    """Rejecting for so long, the filter doubts itself. Receivers err under crowns for 10 to 60 s together."""
 
     yaw_known_deg: Positive = 3.0
     spacing_s: NotNegative = 0.9

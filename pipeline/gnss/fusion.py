@@ -34,10 +34,13 @@ class GnssFusion:
         self._gated = 0
 
     def add_odometry(self, estimate: OdometryEstimate) -> None:
-        """In order of time."""
-        self._history.add(estimate)
-        while self._waiting and self._waiting[0].stamp_ns <= estimate.stamp_ns:
-            self._place(self._waiting.popleft())
+        """In order of time. Where its way begins anew, so does the search for the yaw; the datum stays."""
+        if not self._history.add(estimate):
+            self._search, self._bank = YawSearch(self.config), None
+        due = [fix for fix in self._waiting if fix.stamp_ns <= estimate.stamp_ns]
+        for fix in due:
+            self._waiting.remove(fix)
+            self._place(fix)
 
     def add_fix(self, fix: GnssFix) -> None:
         """Any fix, whenever it comes: it is compared with the odometry at its own stamp."""
@@ -48,9 +51,9 @@ class GnssFusion:
             self._waiting.append(fix)
 
     def state(self) -> MapToOdom | None:
-        """None before the first fix."""
+        """None before the first fix in this `odom`."""
         datum = self._sightings.datum
-        if datum is None:
+        if datum is None or not self._search.sightings:
             return None
         place = (datum.latitude_deg, datum.longitude_deg, datum.height_m)
         counts = (place, self._used, self._gated + self._sightings.refused)

@@ -36,8 +36,13 @@ class History:
         """Stamp of the last estimate."""
         return self._passages[-1].stamp_ns if self._passages else None
 
-    def add(self, estimate: OdometryEstimate) -> Passage:
-        """Estimates come in order of time."""
+    def add(self, estimate: OdometryEstimate) -> bool:
+        """In order of time; others are left out. False when the odometry began anew, and with it the history."""
+        if self._passages and estimate.stamp_ns <= self._passages[-1].stamp_ns:
+            return True
+        anew = estimate.travelled_m < self._travelled_m
+        if anew:
+            self._passages.clear()
         antenna = antenna_m(estimate, self._config)
         last = self._passages[-1] if self._passages else None
         way = 0.0
@@ -46,12 +51,11 @@ class History:
             stretch = self._config.degenerate_factor**2 if weak else 1.0
             way = last.drift_way_m + stretch * max(estimate.travelled_m - self._travelled_m, 0.0)
         self._travelled_m = estimate.travelled_m
-        passage = Passage(estimate.stamp_ns, antenna, way)
-        self._passages.append(passage)
+        self._passages.append(Passage(estimate.stamp_ns, antenna, way))
         if estimate.stamp_ns - self._passages[0].stamp_ns > 2e9 * self._config.history_s:
             oldest_ns = estimate.stamp_ns - int(1e9 * self._config.history_s)
             del self._passages[: bisect_left(self._passages, oldest_ns, key=_stamp)]
-        return passage
+        return not anew
 
     def at(self, stamp_ns: int) -> Passage | None:
         """Between two estimates; None outside of what is known."""
