@@ -104,10 +104,9 @@ def _block(label: str, walks: list[Walk]) -> None:
     alone = [walk.odometry.alone_m for walk in walks]
     share = np.mean([walk.odometry.end_error_m / walk.odometry.estimates[-1].travelled_m for walk in walks])
     print(f"\nodometry that drifts by {label} of the way (measured {100 * share:.2f} % at the end)")
-    figures = f"{'rmse':>7}{'max':>7}"
-    print(
-        f"{'':24}{'fixes':11}{'live mean':>10}{figures}{'nees':>6}   {'off. mean':>10}{figures}{'nees':>8}  worse than none"
-    )
+    sizes = f"{'rmse':>7}{'max':>7}"
+    heads = f"{'live mean':>10}{sizes}{'nees':>6}   {'off. mean':>10}{sizes}{'nees':>8}"
+    print(f"{'':24}{'fixes':11}{heads}  worse than none")
     print(f"{'no GNSS':24}{'-':11}{_figures(alone)}{'':9}{_figures(alone)}")
     for name, preset, config in ROWS:
         live = [followed(walk, walk.fixes[preset], config) for walk in walks]
