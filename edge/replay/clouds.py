@@ -69,7 +69,8 @@ class CloudLayout:
             return np.zeros(len(points), np.uint8)
         values = points[name]
         if values.dtype == np.uint8 and gain == 1.0:
-            return np.asarray(values.copy(), np.uint8)
+            plain: npt.NDArray[np.uint8] = values.copy()
+            return plain
         scaled = np.nan_to_num(values.astype(np.float32) * gain)
         return np.clip(np.rint(scaled), 0, _BRIGHTEST).astype(np.uint8)
 
