@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("edge.cli.validate", "judge a recording"),
     "recover": ("edge.cli.recover", "copy everything sound out of a damaged recording"),
     "info": ("edge.cli.info", "topics, types, counts and rates of a recording"),
+    "process": ("edge.cli.process", "odometry, GNSS fusion and products from a recording"),
     "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
     "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }

@@ -69,10 +69,10 @@ class CloudLayout:
             return np.zeros(len(points), np.uint8)
         values = points[name]
         if values.dtype == np.uint8 and gain == 1.0:
-            plain: npt.NDArray[np.uint8] = values.copy()
-            return plain
-        scaled = np.nan_to_num(values.astype(np.float32) * gain)
-        return np.clip(np.rint(scaled), 0, _BRIGHTEST).astype(np.uint8)
+            return np.array(values, np.uint8)
+        scaled = np.nan_to_num(np.asarray(values, np.float32) * gain)
+        octets: npt.NDArray[np.uint8] = np.clip(np.rint(scaled), 0, _BRIGHTEST).astype(np.uint8)
+        return octets
 
 
 def decode_cloud(type_name: str, data: bytes | memoryview) -> Cloud:

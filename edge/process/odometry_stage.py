@@ -1,0 +1,98 @@
+"""First stage: every sweep through the odometry. Writes the track, the fixes and the map's tiles."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from drivers.messages import GnssFix
+from edge.config import Products
+from edge.process.ahead import ahead
+from edge.process.estimators import Odometry
+from edge.replay.pairing import Pairing, Sweep
+from edge.replay.replay import Replay
+from pipeline.products.tiles import TileStore
+from pipeline.products.track import TrackWriter
+
+TRACK, FIXES, TILES, FACTS = "odometry.track", "fixes.msgpack", "tiles", "odometry.json"
+_DEPTH = 4
+"""Sweeps decoded ahead: 2 MB."""
+
+
+class OdometryFacts(msgspec.Struct):
+    """What happened, for the products and for people."""
+
+    sweeps: int = 0
+    estimates: int = 0
+    degenerate: int = 0
+    fixes: int = 0
+    seconds: float = 0.0
+    """Of work."""
+    late_scans: int = 0
+    late_samples: int = 0
+    refusals: dict[str, int] = {}
+    """What the odometry said where it gave no estimate, and how often."""
+    notes: tuple[str, ...] = ()
+    damages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryStage:
+    """Bounded memory: the estimators', the tiles', and a few sweeps."""
+
+    replay: Replay
+    odometry: Odometry
+    products: Products
+    gnss: bool
+
+    def run(self, folder: Path, advance: Callable[[float], None]) -> OdometryFacts:
+        """advance: told the share that is done."""
+        facts, started_s = OdometryFacts(), time.monotonic()
+        store = TileStore(folder / TILES, self.products.tile_m, self.products.voxel_m, self.products.memory_mib << 20)
+        pairing = Pairing()
+        fixes: list[GnssFix] = []
+        with TrackWriter(folder / TRACK) as track:
+            for item in ahead(self._items(pairing), _DEPTH):
+                if isinstance(item, GnssFix):
+                    fixes.append(item)
+                    continue
+                self._sweep(item, track, store, facts)
+                facts.sweeps += 1
+                if facts.sweeps % 10 == 0:
+                    advance(facts.sweeps / max(self.replay.scans, 1))
+        store.close()
+        (folder / FIXES).write_bytes(msgspec.msgpack.encode(fixes))
+        facts.fixes = len(fixes)
+        facts.late_scans, facts.late_samples = pairing.left.scans, pairing.left.samples
+        facts.notes, facts.damages = self.replay.notes, self.replay.damages
+        facts.seconds = time.monotonic() - started_s
+        (folder / FACTS).write_bytes(msgspec.json.encode(facts))
+        return facts
+
+    def _items(self, pairing: Pairing) -> Iterator[Sweep | GnssFix]:
+        for message in self.replay.messages(gnss=self.gnss):
+            if isinstance(message, GnssFix):
+                yield message
+            else:
+                yield from pairing.add(message)
+        yield from pairing.flush()
+
+    def _sweep(self, sweep: Sweep, track: TrackWriter, store: TileStore, facts: OdometryFacts) -> None:
+        estimate = self.odometry.process_scan(sweep.scan, sweep.imu)
+        if estimate is None:
+            note = str(getattr(self.odometry, "note", "")) or "no estimate"
+            facts.refusals[note] = facts.refusals.get(note, 0) + 1
+            return
+        track.add(estimate)
+        store.add(self.odometry.cloud(), facts.estimates)
+        facts.estimates += 1
+        facts.degenerate += estimate.degenerate
+
+
+def read_fixes(path: Path) -> list[GnssFix]:
+    """In order of arrival."""
+    return msgspec.msgpack.decode(path.read_bytes(), type=list[GnssFix])
