@@ -19,6 +19,7 @@ from edge.errors import EdgeError, UsageError
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("edge.cli.demo", "the whole mission on the emulated payload"),
     "recorder": ("edge.cli.recorder", "the service: sensors, files, health, control socket"),
+    "pipeline": ("edge.cli.pipeline", "the live service: where the payload is, recorded as it goes"),
     "tui": ("edge.cli.tui", "the operator's screen: start, stop and mark with one key each"),
     "start": ("edge.cli.start", "start recording"),
     "stop": ("edge.cli.stop", "stop recording and finish the session"),

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from drivers.messages import GnssFix, ImuSample, LidarScan
 from edge.config import Config
 from edge.replay.geometry import Geometry
-from pipeline.estimates import GlobalPose, OdometryEstimate
+from pipeline.estimates import GlobalPose, MapToOdom, OdometryEstimate
 from pipeline.gnss.config import FusionConfig
 from pipeline.odometry.config import OdometryConfig
 
@@ -23,6 +23,15 @@ class Odometry(Protocol):
 
     def process_scan(self, scan: LidarScan, imu: Sequence[ImuSample]) -> OdometryEstimate | None: ...
     def cloud(self) -> npt.NDArray[np.float32]: ...
+
+
+class Fusion(Protocol):
+    """`GnssFusion`, as far as it is used here."""
+
+    def add_odometry(self, estimate: OdometryEstimate) -> None: ...
+    def add_fix(self, fix: GnssFix) -> None: ...
+    def state(self) -> MapToOdom | None: ...
+    def global_pose(self, estimate: OdometryEstimate) -> GlobalPose | None: ...
 
 
 class Datum(Protocol):
@@ -53,14 +62,18 @@ class Estimators:
 
     odometry: Callable[[OdometryConfig], Odometry]
     smooth: Smooth
+    """For a whole session, afterwards."""
+    fusion: Callable[[FusionConfig], Fusion]
+    """As it goes."""
 
 
 def estimators() -> Estimators:
     """The real ones; loads the compiled kernels."""
+    from pipeline.gnss.fusion import GnssFusion  # noqa: PLC0415
     from pipeline.gnss.smoother import smooth  # noqa: PLC0415 - numba takes a second
     from pipeline.odometry.odometry import LidarInertialOdometry  # noqa: PLC0415
 
-    return Estimators(LidarInertialOdometry, smooth)
+    return Estimators(LidarInertialOdometry, smooth, GnssFusion)
 
 
 def odometry_config(config: Config, geometry: Geometry) -> OdometryConfig:

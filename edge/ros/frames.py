@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+MAP = "map"
+ODOM = "odom"
 BASE_LINK = "base_link"
 LIDAR = "livox_frame"
 CAMERA = "camera"

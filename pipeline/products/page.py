@@ -117,7 +117,8 @@ def _fixes(story: Story) -> list[Dots]:
         return []
     good = np.array([fix.quality in (FixQuality.RTK_FIXED, FixQuality.RTK_FLOAT) for fix in story.fixes])
     kinds = ((~good, "GNSS: single, DGPS", "b"), (good, "RTK", "c"))
-    return [Dots(*story.fixes_m[which, :2].T, name, tone) for which, name, tone in kinds if which.any()]
+    east, north = story.fixes_m[:, 0], story.fixes_m[:, 1]
+    return [Dots(east[which], north[which], name, tone) for which, name, tone in kinds if which.any()]
 
 
 def _matches(seconds: Array, track: npt.NDArray[np.void], bands: list[tuple[float, float]], time: str) -> Plot:

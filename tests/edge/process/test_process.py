@@ -62,7 +62,7 @@ class Turned:
 
 
 def fakes(*, smooth=lambda _odometry, _fixes, _config: Turned(), odometry=StraightOn):
-    return lambda: Estimators(odometry, smooth)
+    return lambda: Estimators(odometry, smooth, None)
 
 
 @pytest.fixture
