@@ -93,10 +93,8 @@ class LivePipeline:
         """For the operator."""
         estimate, pose, governor = self._estimate, self._pose, self._governor
         if estimate is None:
-            note = str(getattr(self._odometry, "note", ""))
-            return Location(
-                "starting", 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), False, governor.dropped, governor.share, 0.0, note
-            )
+            note, nowhere = self._odometry.note, (0.0, 0.0, 0.0)
+            return Location("starting", 0.0, 0.0, 0.0, nowhere, False, governor.dropped, governor.share, 0.0, note)
         age_s = max(0.0, (now_ns - self._estimated_ns) / 1e9)
         covariance = pose.covariance if pose is not None else estimate.covariance
         x, y, z = (pose.position_enu_m if pose is not None else estimate.position_m).tolist()
@@ -124,16 +122,18 @@ class LivePipeline:
 
     def _work(self, sweep: Sweep, bus: Bus) -> None:
         began_ns = self._clock()
-        estimate = self._odometry.process_scan(sweep.scan, sweep.imu)
-        if estimate is not None:
-            self._fusion.add_odometry(estimate)
-            self._estimate, self._pose = estimate, self._fusion.global_pose(estimate)
-            self._estimated_ns = self._clock()
-            bus.send(odometry_pose(estimate, self._estimated_ns))
-            bus.send(transforms(estimate, self._fusion.state(), self._estimated_ns))
-            if self._pose is not None:
-                bus.send(gnss_pose(self._pose, self._estimated_ns))
+        for tracked in self._odometry.process(sweep):
+            self._tell(tracked.estimate, bus)
         self._governor.took((self._clock() - began_ns) / 1e9)
+
+    def _tell(self, estimate: OdometryEstimate, bus: Bus) -> None:
+        self._fusion.add_odometry(estimate)
+        now_ns = self._estimated_ns = self._clock()
+        self._estimate, self._pose = estimate, self._fusion.global_pose(estimate)
+        bus.send(odometry_pose(estimate, now_ns))
+        bus.send(transforms(estimate, self._fusion.state(), now_ns))
+        if self._pose is not None:
+            bus.send(gnss_pose(self._pose, now_ns))
 
 
 def serve(config: Config, folder: Path, stop: threading.Event) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,19 +10,31 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from drivers.messages import GnssFix, ImuSample, LidarScan
+from drivers.messages import GnssFix
 from edge.config import Config
 from edge.replay.geometry import Geometry
+from edge.replay.pairing import Sweep
 from pipeline.estimates import GlobalPose, MapToOdom, OdometryEstimate
 from pipeline.gnss.config import FusionConfig
 from pipeline.odometry.config import OdometryConfig
 
 
-class Odometry(Protocol):
-    """`LidarInertialOdometry`, as far as it is used here."""
+class Tracked(Protocol):
+    """An estimate, with the points (n, 4) of its sweep in `odom`: x, y, z, intensity."""
 
-    def process_scan(self, scan: LidarScan, imu: Sequence[ImuSample]) -> OdometryEstimate | None: ...
+    @property
+    def estimate(self) -> OdometryEstimate: ...
+    @property
     def cloud(self) -> npt.NDArray[np.float32]: ...
+
+
+class Odometry(Protocol):
+    """`SweepOdometry`, as far as it is used here."""
+
+    @property
+    def note(self) -> str: ...
+    def process(self, sweep: Sweep) -> Iterable[Tracked]: ...
+    def flush(self) -> Iterable[Tracked]: ...
 
 
 class Fusion(Protocol):
@@ -69,11 +81,11 @@ class Estimators:
 
 def estimators() -> Estimators:
     """The real ones; loads the compiled kernels."""
+    from edge.process.sweep_odometry import SweepOdometry  # noqa: PLC0415 - numba takes a second
     from pipeline.gnss.fusion import GnssFusion  # noqa: PLC0415
-    from pipeline.gnss.smoother import smooth  # noqa: PLC0415 - numba takes a second
-    from pipeline.odometry.odometry import LidarInertialOdometry  # noqa: PLC0415
+    from pipeline.gnss.smoother import smooth  # noqa: PLC0415
 
-    return Estimators(LidarInertialOdometry, smooth, GnssFusion)
+    return Estimators(SweepOdometry, smooth, GnssFusion)
 
 
 def odometry_config(config: Config, geometry: Geometry) -> OdometryConfig:

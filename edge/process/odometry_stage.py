@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import msgspec
 from drivers.messages import GnssFix
 from edge.config import Products
 from edge.process.ahead import ahead
-from edge.process.estimators import Odometry
+from edge.process.estimators import Odometry, Tracked
 from edge.replay.pairing import Pairing, Sweep
 from edge.replay.replay import Replay
 from pipeline.products.tiles import TileStore
@@ -60,10 +60,12 @@ class OdometryStage:
                 if isinstance(item, GnssFix):
                     fixes.append(item)
                     continue
-                self._sweep(item, track, store, facts)
                 facts.sweeps += 1
+                if not self._keep(self.odometry.process(item), track, store, facts) and (note := self.odometry.note):
+                    facts.refusals[note] = facts.refusals.get(note, 0) + 1
                 if facts.sweeps % 10 == 0:
                     advance(facts.sweeps / max(self.replay.scans, 1))
+            self._keep(self.odometry.flush(), track, store, facts)
         store.close()
         (folder / FIXES).write_bytes(msgspec.msgpack.encode(fixes))
         facts.fixes = len(fixes)
@@ -81,16 +83,16 @@ class OdometryStage:
                 yield from pairing.add(message)
         yield from pairing.flush()
 
-    def _sweep(self, sweep: Sweep, track: TrackWriter, store: TileStore, facts: OdometryFacts) -> None:
-        estimate = self.odometry.process_scan(sweep.scan, sweep.imu)
-        if estimate is None:
-            note = str(getattr(self.odometry, "note", "")) or "no estimate"
-            facts.refusals[note] = facts.refusals.get(note, 0) + 1
-            return
-        track.add(estimate)
-        store.add(self.odometry.cloud(), facts.estimates)
-        facts.estimates += 1
-        facts.degenerate += estimate.degenerate
+    @staticmethod
+    def _keep(found: Iterable[Tracked], track: TrackWriter, store: TileStore, facts: OdometryFacts) -> bool:
+        """Whether there was any."""
+        before = facts.estimates
+        for one in found:
+            track.add(one.estimate)
+            store.add(one.cloud, facts.estimates)
+            facts.estimates += 1
+            facts.degenerate += one.estimate.degenerate
+        return facts.estimates > before
 
 
 def read_fixes(path: Path) -> list[GnssFix]:

@@ -12,6 +12,7 @@ from edge.control.messages import Location
 from edge.live.pipeline import LivePipeline
 from edge.live.poses import odometry_pose
 from edge.process.estimators import Estimators
+from edge.process.sweep_odometry import Tracked
 from edge.recording.messages import GnssPose, OdometryPose, Transforms
 from edge.ros.encode import ENCODERS
 from pipeline.estimates import GlobalPose, MapToOdom, OdometryEstimate
@@ -37,9 +38,10 @@ class Odometry:
         self.note = "keep still"
         self.sweeps: list = []
 
-    def process_scan(self, scan, imu):
-        self.sweeps.append((scan.stamp_ns, len(imu)))
-        return None if len(self.sweeps) < 3 else estimate(scan.stamp_ns)
+    def process(self, sweep):
+        self.sweeps.append((sweep.scan.stamp_ns, len(sweep.imu)))
+        if len(self.sweeps) >= 3:
+            yield Tracked(estimate(sweep.scan.stamp_ns), np.empty((0, 4), np.float32))
 
 
 class Fusion:

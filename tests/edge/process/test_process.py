@@ -16,6 +16,7 @@ from edge.errors import EdgeError
 from edge.process import process as module
 from edge.process.estimators import Estimators
 from edge.process.process import Task, process
+from edge.process.sweep_odometry import Tracked
 from pipeline.estimates import GlobalPose, OdometryEstimate
 from pipeline.gnss.geodesy import Datum
 from tests.edge.replay import foreign
@@ -32,21 +33,23 @@ class StraightOn:
         self.note = "not moving yet"
         self.sweeps = 0
 
-    def process_scan(self, scan, imu):
+    def process(self, sweep):
         self.sweeps += 1
         if self.sweeps == 1:
-            return None
-        assert imu
-        self.scan, self.at = scan, np.array([0.1 * self.sweeps, 0.0, 0.0])
+            return
+        assert sweep.imu
+        scan, at = sweep.scan, np.array([0.1 * self.sweeps, 0.0, 0.0])
         end_ns = scan.stamp_ns + int(scan.offset_ns.max())
         speed, zero = np.array([1.0, 0.0, 0.0]), np.zeros(3)
         far = 0.1 * self.sweeps
-        return OdometryEstimate(
-            end_ns, self.at, np.eye(3), speed, np.eye(6) * 0.01, zero, zero, far, False, np.empty((0, 3)), 400, 350
+        estimate = OdometryEstimate(
+            end_ns, at, np.eye(3), speed, np.eye(6) * 0.01, zero, zero, far, False, np.empty((0, 3)), 400, 350
         )
 
-    def cloud(self):
-        return np.column_stack([self.scan.xyz_m + self.at, self.scan.reflectivity]).astype(np.float32)
+        yield Tracked(estimate, np.column_stack([scan.xyz_m + at, scan.reflectivity]).astype(np.float32))
+
+    def flush(self):
+        return ()
 
 
 @dataclass
@@ -119,8 +122,8 @@ def test_an_interrupted_run_goes_on_at_its_stage(recording):
 
 def test_a_recording_that_gives_no_pose_is_an_error_with_the_reason(recording):
     class Never(StraightOn):
-        def process_scan(self, scan, imu):
-            return None
+        def process(self, sweep):
+            return ()
 
     with pytest.raises(EdgeError, match=r"no pose could be estimated from 8 sweeps: not moving yet \(8 times\)"):
         process(Task([recording]), Config(), load=fakes(odometry=Never))
