@@ -38,6 +38,8 @@ class OdometryFacts(msgspec.Struct):
     """What the odometry said where it gave no estimate, and how often."""
     notes: tuple[str, ...] = ()
     damages: tuple[str, ...] = ()
+    host_offset_ns: int | None = None
+    """Session time minus the recording computer's monotonic time; None in recordings of others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +73,7 @@ class OdometryStage:
         facts.fixes = len(fixes)
         facts.late_scans, facts.late_samples = pairing.left.scans, pairing.left.samples
         facts.notes, facts.damages = self.replay.notes, self.replay.damages
+        facts.host_offset_ns = _host_offset_ns(self.replay.facts)
         facts.seconds = time.monotonic() - started_s
         (folder / FACTS).write_bytes(msgspec.json.encode(facts))
         return facts
@@ -93,6 +96,13 @@ class OdometryStage:
             facts.estimates += 1
             facts.degenerate += one.estimate.degenerate
         return facts.estimates > before
+
+
+def _host_offset_ns(facts: dict[str, str]) -> int | None:
+    try:
+        return int(facts["anchor_utc_ns"]) - int(facts["anchor_monotonic_ns"])
+    except (KeyError, ValueError):
+        return None
 
 
 def read_fixes(path: Path) -> list[GnssFix]:

@@ -60,6 +60,8 @@ class ProductFacts(msgspec.Struct):
     odometry_seconds: float = 0.0
     notes: tuple[str, ...] = ()
     software: str = ""
+    host_offset_ns: int | None = None
+    """Session time minus the recording computer's monotonic time; None in recordings of others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +115,7 @@ class ProductsStage:
             odometry_seconds=done.seconds,
             notes=(*notes, *done.damages),
             software=self.software,
+            host_offset_ns=done.host_offset_ns,
         )
 
     def _trajectories(self, track: npt.NDArray[np.void], placement: Placement | None, facts: ProductFacts) -> None:
