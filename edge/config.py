@@ -92,8 +92,8 @@ class Products(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     voxel_m: Positive = 0.05
     """The map keeps one point in each cube of this size, and the retro-reflectors."""
-    tile_m: Positive = 32.0
-    memory_mib: Count = 192
+    tile_m: Positive = 16.0
+    memory_mib: Count = 96
     """The growing map in memory; the rest waits on the disk."""
 
 

@@ -7,8 +7,9 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from edge.recording.messages import Covariance, GnssPose, OdometryPose, Transforms
-from edge.ros.frames import BASE_LINK, MAP, ODOM, Transform
+from edge.ros.frames import BASE_LINK, EARTH, MAP, ODOM, Transform
 from pipeline.estimates import GlobalPose, MapToOdom, OdometryEstimate
+from pipeline.gnss.geodesy import ecef
 
 Array = npt.NDArray[np.float64]
 Three = tuple[float, float, float]
@@ -34,13 +35,21 @@ def gnss_pose(pose: GlobalPose, receive_ns: int) -> GnssPose:
 
 
 def transforms(estimate: OdometryEstimate, state: MapToOdom | None, receive_ns: int) -> Transforms:
-    """odom -> base_link, and map -> odom once its heading is known."""
+    """odom -> base_link, and once the heading is known map -> odom, and earth -> map, which says where the datum is."""
     found = [Transform(ODOM, BASE_LINK, _three(estimate.position_m), _quaternion(estimate.rotation))]
     if state is not None and state.observable:
         half = state.yaw_rad / 2.0
         turn = (0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
         found.insert(0, Transform(MAP, ODOM, _three(state.translation_m), turn))
+        if state.datum is not None:
+            found.insert(0, _earth_to_map(*state.datum))
     return Transforms(estimate.stamp_ns, receive_ns, tuple(found))
+
+
+def _earth_to_map(latitude_deg: float, longitude_deg: float, height_m: float) -> Transform:
+    """East, north and up at the datum, in Earth-centred axes."""
+    turn = Rotation.from_euler("ZX", [longitude_deg + 90.0, 90.0 - latitude_deg], degrees=True)
+    return Transform(EARTH, MAP, _three(ecef(latitude_deg, longitude_deg, height_m)), _quaternion(turn.as_matrix()))
 
 
 def _ros_covariance(covariance: Array, rotation: Array) -> Covariance:

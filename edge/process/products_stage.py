@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -100,7 +101,8 @@ class ProductsStage:
             notes.append(f"{done.late_scans} sweeps and {done.late_samples} inertial samples came too late, left out")
         if placement is None:
             notes.append(f"not georeferenced: {fused.why}; positions are metres from the start, heading arbitrary")
-        notes += [*dict.fromkeys(note.decode(errors="replace") for note in track["note"] if note)][:20]
+        said = Counter(note.decode(errors="replace") for note in track["note"] if note)
+        notes += [f"{count} sweeps: {note}" for note, count in said.most_common(20)]
         return ProductFacts(
             session=self.session,
             frame="odom" if placement is None else "map",

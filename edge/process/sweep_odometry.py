@@ -59,6 +59,8 @@ class SweepOdometry:
     def _tracked(self, found: Odometry) -> Tracked:
         while len(self._scans) > 1 and end_of(self._scans[0]) < found.stamp_ns:
             self._scans.popleft()
+        if found.gap_s or found.status is Status.COASTING:  # where its points are is a guess: not for the map
+            return Tracked(self._estimate(found), np.empty((0, 4), np.float32))
         scan = self._scans[0]
         world = found.cloud.xyz_m @ found.rotation.T + found.position_m
         cloud = np.column_stack([world, scan.reflectivity[found.cloud.index]]).astype(np.float32)

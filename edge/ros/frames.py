@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+EARTH = "earth"
+"""Earth-centred, Earth-fixed WGS 84 (REP-105)."""
 MAP = "map"
 ODOM = "odom"
 BASE_LINK = "base_link"

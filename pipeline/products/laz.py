@@ -15,6 +15,8 @@ from pipeline.products.tiles import Tile, read_tile, tiles
 from pipeline.products.track import Placement
 
 SCALE_M = 0.001
+_AT_ONCE = 250_000
+"""Points: about 100 bytes each on the way."""
 _GPS_EPOCH_S = 315_964_800
 _LEAP_S = 18
 """GPS minus UTC, since 2017; none is announced."""
@@ -44,7 +46,8 @@ def write_laz(path: Path, source: MapSource, advance: Callable[[float], None]) -
     with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
         for number, tile in enumerate(found):
             points = read_tile(source.tiles, tile, source.voxel_m)
-            writer.write_points(_record(points, header, source, site))
+            for start in range(0, len(points), _AT_ONCE):
+                writer.write_points(_record(points[start : start + _AT_ONCE], header, source, site))
             count += len(points)
             advance((number + 1) / len(found))
     return count

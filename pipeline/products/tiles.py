@@ -14,12 +14,14 @@ RETRO = 150
 away by others."""
 Tile = tuple[int, int]
 _SPAN = 1 << 20
+_FARTHEST_M = 50_000.0
+"""From the start; single precision and the keys of voxels end about here. NaN is farther than anything."""
 
 
 class TileStore:
     """Takes sweeps, keeps at most `budget_bytes` of points in memory. Not thread-safe."""
 
-    def __init__(self, folder: Path, tile_m: float, voxel_m: float, budget_bytes: int = 192 << 20) -> None:
+    def __init__(self, folder: Path, tile_m: float, voxel_m: float, budget_bytes: int = 96 << 20) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         self._tile_m = tile_m
@@ -31,7 +33,7 @@ class TileStore:
 
     def add(self, cloud: npt.NDArray[np.float32], sweep: int) -> None:
         """A sweep's points (n, 4): x, y, z in `odom`, intensity 0..255."""
-        cloud = cloud[np.isfinite(cloud[:, :3]).all(axis=1)]
+        cloud = cloud[(np.abs(cloud[:, :3]) < _FARTHEST_M).all(axis=1)]
         points = np.empty(len(cloud), POINT)
         points["xyz"] = cloud[:, :3]
         points["sweep"] = sweep
@@ -83,8 +85,10 @@ def read_tile(folder: Path, tile: Tile, voxel_m: float) -> npt.NDArray[np.void]:
 
 def thinned(points: npt.NDArray[np.void], voxel_m: float) -> npt.NDArray[np.void]:
     """The first point in each voxel, and the first retro-reflector in each."""
-    cells = np.floor(points["xyz"] / voxel_m).astype(np.int64) + _SPAN
-    keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+    keys = np.zeros(len(points), np.int64)
+    for axis in range(3):  # one at a time: a tile has millions of points
+        keys <<= 21
+        keys |= np.floor(points["xyz"][:, axis] / voxel_m).astype(np.int64) + _SPAN
     keys = (keys << 1) | (points["intensity"] >= RETRO)
     kept: npt.NDArray[np.void] = points[np.sort(np.unique(keys, return_index=True)[1])]
     return kept

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
 from edge.bus.envelope import Envelope
 from edge.config import Config
@@ -16,6 +17,7 @@ from edge.process.sweep_odometry import Tracked
 from edge.recording.messages import GnssPose, OdometryPose, Transforms
 from edge.ros.encode import ENCODERS
 from pipeline.estimates import GlobalPose, MapToOdom, OdometryEstimate
+from pipeline.gnss.geodesy import Datum, geodetic
 from tests.edge.recording import recording_scene as scene
 from tests.edge.replay import foreign
 
@@ -107,7 +109,11 @@ def test_poses_and_transforms_are_sent_once_a_sweep_from_the_first_estimate_on()
     poses = bus.of(OdometryPose)
     assert [pose.stamp_ns for pose in poses] == [scene.S + k * 100 * scene.MS for k in (2, 3, 4)]
     assert len(bus.of(Transforms)) == len(bus.of(GnssPose)) == 3
-    assert [t.parent for t in bus.of(Transforms)[0].transforms] == ["map", "odom"]
+    earth, _, _ = transforms = bus.of(Transforms)[0].transforms
+    assert [t.parent for t in transforms] == ["earth", "map", "odom"]
+    enu = np.array([100.0, 200.0, 30.0])
+    there = Rotation.from_quat(earth.rotation_xyzw).apply(enu) + earth.translation_m
+    np.testing.assert_allclose(geodetic(there), Datum(47.0, 8.0, 500.0).geodetic(enu), atol=1e-8)
 
 
 def test_the_operator_is_told_where_it_is_and_how_sure():
