@@ -10,6 +10,8 @@ import msgspec
 from drivers import registry
 from edge import toml_table
 from edge.errors import ConfigError
+from pipeline.gnss.config import FusionConfig
+from pipeline.odometry.config import OdometryConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -30,6 +32,9 @@ class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     diagnostics: str = "/diagnostics"
     events: str = "/events"
     tf_static: str = "/tf_static"
+    odometry: str = "/odometry"
+    gnss_pose: str = "/gnss/pose"
+    tf: str = "/tf"
 
 
 class Mission(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -76,6 +81,22 @@ class Live(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Scans a second sent to viewers; the file always gets all of them."""
 
 
+class Bus(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the recorder and the live pipeline tell each other, on sockets beside the control socket."""
+
+    enabled: bool = True
+
+
+class Products(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `mapforest process` makes."""
+
+    voxel_m: Positive = 0.05
+    """The map keeps one point in each cube of this size, and the retro-reflectors."""
+    tile_m: Positive = 16.0
+    memory_mib: Count = 96
+    """The growing map in memory; the rest waits on the disk."""
+
+
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What validation expects of one topic."""
 
@@ -108,6 +129,10 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     live: Live = Live()
     validation: Validation = Validation()
     topics: Topics = Topics()
+    odometry: OdometryConfig = OdometryConfig()
+    fusion: FusionConfig = FusionConfig()
+    products: Products = Products()
+    bus: Bus = Bus()
     calibration: str = ""
     """Path of the calibration file; empty: the nominal geometry of the payload."""
     sensors: dict[str, dict[str, Any]] = msgspec.field(default_factory=_default_sensors)

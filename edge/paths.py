@@ -11,6 +11,8 @@ from edge.config import Config
 SYSTEM_RUNTIME = Path("/run/mapforest")
 """The service's runtime directory: `RuntimeDirectory=mapforest` in the unit."""
 SOCKET_NAME = "control.sock"
+BUS_NAME = "bus.sock"
+RESULTS_NAME = "results.sock"
 
 
 def recordings_folder(config: Config) -> Path:

@@ -106,6 +106,7 @@ EOF
 
 install_units() {
   copy "$here/mapforest-recorder.service" /etc/systemd/system/mapforest-recorder.service 0644
+  copy "$here/mapforest-pipeline.service" /etc/systemd/system/mapforest-pipeline.service 0644
   copy "$here/mapforest-tui@.service" /etc/systemd/system/mapforest-tui@.service 0644
   copy "$here/90-mapforest.rules" /etc/udev/rules.d/90-mapforest.rules 0644
   copy "$here/90-mapforest.conf" /etc/sysctl.d/90-mapforest.conf 0644
@@ -118,17 +119,19 @@ activate() {
   run sysctl --quiet --load /etc/sysctl.d/90-mapforest.conf
   run udevadm control --reload
   run udevadm trigger --subsystem-match=tty
-  run systemctl enable mapforest-recorder.service
-  run systemctl restart mapforest-recorder.service
+  run systemctl enable mapforest-recorder.service mapforest-pipeline.service
+  run systemctl restart mapforest-recorder.service mapforest-pipeline.service
   [ -z "$console" ] || run systemctl enable --now "mapforest-tui@$console.service"
 }
 
 uninstall() {
   if systemd_runs; then
+    run systemctl disable --now mapforest-pipeline.service || true
     run systemctl disable --now mapforest-recorder.service || true
     run systemctl disable --now 'mapforest-tui@*.service' || true
   fi
   remove /etc/systemd/system/mapforest-recorder.service
+  remove /etc/systemd/system/mapforest-pipeline.service
   remove /etc/systemd/system/mapforest-recorder.service.d
   remove /etc/systemd/system/mapforest-tui@.service
   remove /etc/udev/rules.d/90-mapforest.rules

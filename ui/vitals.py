@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from edge.control.messages import Gnss, Host, Status
+from edge.control.messages import Gnss, Host, Location, Status
 from ui import units
 from ui.faults import left_tone, queue_tone
 from ui.pieces import Pieces, badge, fit
@@ -68,6 +68,28 @@ def gnss_line(gnss: Gnss | None) -> Pieces:
     )
     if gnss.age_s > OLD_FIX_S:
         return (*pieces, (f"  {Tone.BAD.symbol} {units.age(gnss.age_s)} old", Tone.BAD.text))
+    return pieces
+
+
+def location_line(location: Location) -> Pieces:
+    """What the live pipeline says: state in a badge, then way, speed, sigma, and what it had to leave out."""
+    bad = location.state == "lost"
+    tone = Tone.BAD if bad else Tone.GOOD if location.state == "tracking" else Tone.WARN
+    label = ("POSE    ", "$quiet-text")
+    start = (label, *badge(location.state.upper(), tone, BADGE))
+    if location.state == "starting":
+        return (*start, (f"  {location.note}", ""))
+    east, north, up = location.position_m
+    frame = "map" if location.georeferenced else "local"
+    pieces: Pieces = (
+        *start,
+        (f"  {location.distance_m:.0f} m  {location.speed_m_s:.1f} m/s", ""),
+        (f"  ±{units.metres(location.sigma_m)} {frame}", "bold"),
+        (f"  {east:+.1f} {north:+.1f} {up:+.1f}", "$quiet-text"),
+    )
+    if location.dropped or location.thinned < 1.0:
+        behind = f"  {Tone.WARN.symbol} {location.thinned:.0%} of the points, {location.dropped} sweeps left out"
+        pieces = (*pieces, (behind, Tone.WARN.text))
     return pieces
 
 

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from benchmarks.odometry.simulated import EPOCH_NS, IMU_NS, LIDAR_IN_BASE_M, Walk, shortened, walk
 from drivers.sim.scenarios import scenario
-from pipeline.evaluation.trajectory import Alignment, Errors, Poses, align, length_m, position_errors, rpe
+from pipeline.evaluation.trajectory import Trajectory, TrajectoryErrors, aligned, trajectory_errors
 
 PEERS_START_S = 100.0
 SCENARIOS = ("open_trail", "thicket", "slope", "meadow_edge", "bicycle", "uav", "shaking", "loop_1200")
@@ -30,18 +31,15 @@ DIVERGED_M = 5.0
 
 @dataclass(frozen=True)
 class Score:
-    """Of one system on one walk. ape, rpe in cm; rpe_per_100_m None on a shorter way."""
+    """Of one system on one walk. over_10, over_100: its errors with RPE over so many metres, None without poses."""
 
     system: str
     finished: bool
-    ape: Errors
-    vertical_cm: float
-    rpe_cm: float
-    rpe_100_cm: float | None
+    over_10: TrajectoryErrors | None
+    over_100: TrajectoryErrors | None
     ms_median: float
     ms_p99: float
     peak_mb: float
-    length_m: float
     note: str
 
 
@@ -66,28 +64,21 @@ def score(one: Walk, system: str, options: argparse.Namespace) -> Score:
     t, position, quaternion, _ = one.truth()
     inside = (stamps >= t[0]) & (stamps <= t[-1])
     if inside.sum() < 10:
-        nothing = Errors(*(float("nan"),) * 4)
-        return Score(system, False, nothing, 0.0, 0.0, None, 0.0, 0.0, 0.0, 0.0, str(found["failed"]) or "no poses")
+        return Score(system, False, None, None, 0.0, 0.0, 0.0, str(found["failed"]) or "no poses")
     truth = _truth_at(t, position, quaternion, stamps[inside])
     # Rotations of peers are not kept: positions alone say where they were.
-    estimate = Poses(stamps[inside], found["position"][inside], truth.rotation)
-    laid = align(estimate, truth, Alignment.SE3)
-    errors = Errors.of(position_errors(laid, truth))
-    apart = rpe(Poses(laid.stamp_ns, laid.position_m, truth.rotation), truth, 10.0)
-    far = rpe(Poses(laid.stamp_ns, laid.position_m, truth.rotation), truth, 100.0)
+    laid = aligned(Trajectory(truth.stamps_ns, found["position"][inside], truth.rotations), truth, "se3")
+    laid = Trajectory(truth.stamps_ns, laid.positions_m, truth.rotations)
+    over_10 = trajectory_errors(laid, truth, rpe_over_m=10.0)
     done = inside.sum() / one.scan_count
-    vertical = float(np.sqrt(np.mean((laid.position_m - truth.position_m)[:, 2] ** 2)))
     return Score(
         system,
-        bool(done > 0.95 and errors.worst < DIVERGED_M),
-        errors,
-        100.0 * vertical,
-        100.0 * apart[0].rmse if apart else float("nan"),
-        100.0 * far[0].rmse if far else None,
+        bool(done > 0.95 and over_10.ape_m.worst < DIVERGED_M),
+        over_10,
+        trajectory_errors(laid, truth, rpe_over_m=100.0),
         float(np.median(found["ms"])),
         float(np.percentile(found["ms"], 99)),
         float(found["peak_mb"]),
-        length_m(truth),
         str(found["failed"]),
     )
 
@@ -134,30 +125,21 @@ def _host_ns(stamps_s: np.ndarray) -> np.ndarray:
     return np.round((stamps_s - PEERS_START_S) * 1e9).astype(np.int64) + EPOCH_NS
 
 
-def _truth_at(t: np.ndarray, position: np.ndarray, quaternion: np.ndarray, stamps: np.ndarray) -> Poses:
+def _truth_at(t: np.ndarray, position: np.ndarray, quaternion: np.ndarray, stamps: np.ndarray) -> Trajectory:
     place = np.column_stack([np.interp(stamps, t, position[:, k]) for k in range(3)])
     nearest = quaternion[np.clip(np.searchsorted(t, stamps), 0, len(t) - 1)]
-    return Poses(stamps, place, rotations(nearest))
-
-
-def rotations(quaternion: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) of x, y, z, w (n, 4)."""
-    x, y, z, w = quaternion.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return Trajectory(stamps.astype(np.int64), place, Rotation.from_quat(nearest).as_matrix())
 
 
 def _row(score: Score) -> str:
-    far = "-" if score.rpe_100_cm is None else f"{score.rpe_100_cm:.1f}"
-    return (
-        f"{score.system} | {100 * score.ape.rmse:.2f} | {100 * score.ape.worst:.1f} | {score.vertical_cm:.2f} | "
-        f"{score.rpe_cm:.2f} | {far} | {score.ms_median:.1f} | {score.ms_p99:.1f} | {score.peak_mb:.0f} | "
-        f"{'' if score.finished else 'diverged or ended early '}{score.note}"
-    )
+    state = "" if score.finished else "diverged or ended early "
+    time = f"{score.ms_median:.1f} | {score.ms_p99:.1f} | {score.peak_mb:.0f} | {state}{score.note}"
+    if score.over_10 is None or score.over_100 is None:
+        return f"{score.system} | - | - | - | - | - | {time}"
+    ape, near, far = score.over_10.ape_m, score.over_10.rpe_m.rmse, score.over_100.rpe_m.rmse
+    centimetres = [ape.rmse, ape.worst, score.over_10.ape_vertical_m.rmse, near, far]
+    told = " | ".join("-" if np.isnan(value) else f"{100.0 * value:.2f}" for value in centimetres)
+    return f"{score.system} | {told} | {time}"
 
 
 def _options() -> argparse.Namespace:

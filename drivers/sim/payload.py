@@ -20,7 +20,7 @@ from drivers.sim.faults import SENSORS, Fault, FaultPlan
 from drivers.sim.gnss import ReceiverModel
 from drivers.sim.gnss_errors import PRESETS
 from drivers.sim.scenarios import WorldConfig
-from drivers.sim.truth import write_truth
+from drivers.sim.truth import write_epoch, write_truth
 from drivers.sim.world import World, build
 
 READY_S = 180.0
@@ -105,6 +105,8 @@ class Payload:
             self.close()
             raise
         self._epoch_ns.value = time.monotonic_ns() + LEAD_NS
+        if self.config.truth is not None:
+            write_epoch(self.config.truth, self.epoch_ns)
         return self
 
     def __exit__(

@@ -39,6 +39,11 @@ def write_truth(world: World, folder: Path) -> None:
     (folder / "world.json").write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 
+def write_epoch(folder: Path, epoch_ns: int) -> None:
+    """epoch.json: the host's monotonic time at t = 0 of poses.tum."""
+    (folder / "epoch.json").write_text(json.dumps({"monotonic_ns": epoch_ns}) + "\n", encoding="utf-8")
+
+
 def _poses(world: World, path: Path) -> None:
     t_ns = np.arange(0, world.trajectory.duration_ns + 1, STEP_NS)
     position, _ = world.trajectory.poses(t_ns)

@@ -19,6 +19,7 @@ from edge.errors import EdgeError, UsageError
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("edge.cli.demo", "the whole mission on the emulated payload"),
     "recorder": ("edge.cli.recorder", "the service: sensors, files, health, control socket"),
+    "pipeline": ("edge.cli.pipeline", "the live service: where the payload is, recorded as it goes"),
     "tui": ("edge.cli.tui", "the operator's screen: start, stop and mark with one key each"),
     "start": ("edge.cli.start", "start recording"),
     "stop": ("edge.cli.stop", "stop recording and finish the session"),
@@ -28,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("edge.cli.validate", "judge a recording"),
     "recover": ("edge.cli.recover", "copy everything sound out of a damaged recording"),
     "info": ("edge.cli.info", "topics, types, counts and rates of a recording"),
+    "process": ("edge.cli.process", "odometry, GNSS fusion and products from a recording"),
     "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
     "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }

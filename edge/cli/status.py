@@ -12,7 +12,7 @@ import msgspec
 from edge.cli import exit_codes
 from edge.cli.asking import connect
 from edge.control.client import ControlClient
-from edge.control.messages import Gnss, Host, Recording, Sensor, Status, Verdict
+from edge.control.messages import Gnss, Host, Location, Recording, Sensor, Status, Verdict
 
 HELP = """show what the recorder does and how the sensors are
 
@@ -47,6 +47,8 @@ def lines(status: Status) -> Iterator[str]:
         yield from _sensor_lines(sensor)
     if status.gnss:
         yield _gnss_line(status.gnss)
+    if status.location:
+        yield _location_line(status.location)
     yield from _host_lines(status.host)
     if status.verdict:
         yield from _verdict_lines(status.verdict)
@@ -99,6 +101,17 @@ def _sensor_lines(sensor: Sensor) -> Iterator[str]:
     yield f"{sensor.name:<8} {sensor.state:<10} {'  '.join([rates, *extras]).strip()}".rstrip()
     if sensor.problem:
         yield f"  ! {sensor.problem}" + (f": {sensor.advice}" if sensor.advice else "")
+
+
+def _location_line(location: Location) -> str:
+    frame = "map" if location.georeferenced else "local"
+    line = (
+        f"pose     {location.state}, {location.distance_m:.1f} m travelled, {location.speed_m_s:.1f} m/s, sigma "
+        f"{location.sigma_m:.2f} m ({frame})"
+    )
+    if location.dropped or location.thinned < 1.0:
+        line += f", {location.thinned:.0%} of the points, {location.dropped} sweeps left out"
+    return f"{line}  {location.note}".rstrip()
 
 
 def _gnss_line(gnss: Gnss) -> str:

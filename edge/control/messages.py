@@ -124,6 +124,26 @@ class Host(msgspec.Struct, frozen=True):
     clock_source: str
 
 
+class Location(msgspec.Struct, frozen=True):
+    """What the live pipeline says of where the payload is. state: starting, tracking, degenerate, lost."""
+
+    state: str
+    distance_m: float
+    speed_m_s: float
+    sigma_m: float
+    """Horizontal, of the pose in `map` when georeferenced, else in `odom`."""
+    position_m: tuple[float, float, float]
+    georeferenced: bool
+    dropped: int
+    """Sweeps left out since the pipeline started, because it was behind."""
+    thinned: float
+    """Share of the points of a sweep that are used; below 1 when the computer is too slow or hot."""
+    age_s: float
+    """Since the last pose."""
+    note: str = ""
+    """What is wrong, in words."""
+
+
 class Verdict(msgspec.Struct, frozen=True):
     """The validator's word on the last session: PASS, WARN or FAIL, with the reasons, worst first."""
 
@@ -148,6 +168,8 @@ class Status(msgspec.Struct, frozen=True, tag="status"):
     problems: tuple[str, ...] = ()
     """What is wrong with the recorder itself (disk nearly full, writer stalled), each with what to do."""
     version: int = PROTOCOL_VERSION
+    location: Location | None = None
+    """None without a live pipeline."""
 
 
 Line = Request | Reply | Status

@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import TypeAlias
 
 from drivers.messages import Message
+from edge.ros.frames import Transform
 
 
 class Level(IntEnum):
@@ -47,5 +48,41 @@ class Mark:
     text: str
 
 
-Recordable: TypeAlias = Message | Diagnostics | Mark
+Covariance: TypeAlias = tuple[float, ...]
+"""36 numbers, row by row: x, y, z (m), then rotation about the fixed axes x, y, z (rad), as ROS has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryPose:
+    """`base_link` in `odom`, from the live pipeline. velocity_m_s, angular_velocity: in `base_link`."""
+
+    stamp_ns: int
+    receive_ns: int
+    position_m: tuple[float, float, float]
+    rotation_xyzw: tuple[float, float, float, float]
+    covariance: Covariance
+    velocity_m_s: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class GnssPose:
+    """`base_link` in `map` (ENU at the datum), from the live pipeline."""
+
+    stamp_ns: int
+    receive_ns: int
+    position_m: tuple[float, float, float]
+    rotation_xyzw: tuple[float, float, float, float]
+    covariance: Covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Transforms:
+    """What `/tf` says at one instant."""
+
+    stamp_ns: int
+    receive_ns: int
+    transforms: tuple[Transform, ...]
+
+
+Recordable: TypeAlias = Message | Diagnostics | Mark | OdometryPose | GnssPose | Transforms
 """Everything that can be offered to a recording."""

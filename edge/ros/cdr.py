@@ -7,6 +7,7 @@ length with the closing NUL.
 from __future__ import annotations
 
 import struct
+from typing import Literal
 
 from edge.errors import FormatError
 
@@ -60,11 +61,11 @@ class CdrReader:
         if len(data) < 4 or data[0] != 0 or data[1] not in (0, 1):
             raise FormatError(f"not a CDR message: it begins with {bytes(data[:4]).hex(' ') or 'nothing'}")
         self._data = memoryview(data)
-        self._order = "<" if data[1] == 1 else ">"
+        self._order: Literal["<", ">"] = "<" if data[1] == 1 else ">"
         self._at = 4
 
     @property
-    def byte_order(self) -> str:
+    def byte_order(self) -> Literal["<", ">"]:
         """`<` or `>`."""
         return self._order
 
@@ -106,6 +107,15 @@ class CdrReader:
         if count * least_bytes > len(self._data) - self._at:
             raise FormatError(f"CDR message ends early: {count} elements announced at byte {self._at}")
         return count
+
+    def structures(self, stride: int, lacking: int) -> tuple[memoryview, int]:
+        """A sequence of structures `stride` bytes apart, the last one `lacking` bytes shorter: octets and count."""
+        count = self.integer("I")
+        size = max(count * stride - lacking, 0)
+        if size > len(self._data) - self._at:
+            raise FormatError(f"CDR message ends early: {count} structures of {stride} bytes announced")
+        self._at += size
+        return self._data[self._at - size : self._at], count
 
     def _take(self, code: str, count: int) -> tuple[float, ...]:
         layout = f"{self._order}{count}{code}"

@@ -15,6 +15,14 @@ from edge.ros import schemas
 from edge.ros.cdr import CdrReader
 from edge.ros.frames import Transform
 
+CUSTOM_POINT = np.dtype(
+    {
+        "names": ["offset_time", "x", "y", "z", "reflectivity", "tag", "line"],
+        "formats": ["u4", "f4", "f4", "f4", "u1", "u1", "u1"],
+        "itemsize": 20,
+    }
+)
+"""19 bytes, and one of alignment that the last point of a message lacks."""
 _NUMPY_CODE = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
@@ -27,6 +35,16 @@ class PointCloud:
     height: int
     width: int
     is_dense: bool
+    points: npt.NDArray[np.void]
+
+
+@dataclass(frozen=True, slots=True)
+class CustomCloud:
+    """livox_ros_driver2/CustomMsg. points: (n,) of CUSTOM_POINT; offset_time counts from timebase_ns."""
+
+    stamp_ns: int
+    frame_id: str
+    timebase_ns: int
     points: npt.NDArray[np.void]
 
 
@@ -109,7 +127,7 @@ class DiagnosticArray:
     statuses: tuple[Status, ...]
 
 
-def decode_point_cloud(data: bytes) -> PointCloud:
+def decode_point_cloud(data: bytes | memoryview) -> PointCloud:
     """sensor_msgs/PointCloud2 with any fields; the points are a view into `data` where rows are contiguous."""
     reader = CdrReader(data)
     stamp_ns, frame_id = reader.header()
@@ -158,7 +176,20 @@ def _points(
     return np.concatenate(rows)
 
 
-def decode_imu(data: bytes) -> Imu:
+def decode_custom_cloud(data: bytes | memoryview) -> CustomCloud:
+    """livox_ros_driver2/CustomMsg, also of livox_ros_driver and livox_interfaces; the points are a copy."""
+    reader = CdrReader(data)
+    stamp_ns, frame_id = reader.header()
+    timebase_ns, _ = reader.integer("Q"), reader.integer("I")
+    for _ in range(4):  # lidar_id, rsvd[3]
+        reader.integer("B")
+    octets, count = reader.structures(CUSTOM_POINT.itemsize, 1)
+    dtype = CUSTOM_POINT.newbyteorder(reader.byte_order)
+    points = np.frombuffer(bytes(octets) + b"\x00", dtype, count) if count else np.empty(0, dtype)
+    return CustomCloud(stamp_ns, frame_id, timebase_ns, points)
+
+
+def decode_imu(data: bytes | memoryview) -> Imu:
     """sensor_msgs/Imu."""
     reader = CdrReader(data)
     stamp_ns, frame_id = reader.header()
@@ -166,7 +197,7 @@ def decode_imu(data: bytes) -> Imu:
     return Imu(stamp_ns, frame_id, values[:4], values[4:13], values[13:16], values[25:28])
 
 
-def decode_fix(data: bytes) -> NavSatFix:
+def decode_fix(data: bytes | memoryview) -> NavSatFix:
     """sensor_msgs/NavSatFix."""
     reader = CdrReader(data)
     stamp_ns, frame_id = reader.header()
@@ -176,21 +207,21 @@ def decode_fix(data: bytes) -> NavSatFix:
     return NavSatFix(stamp_ns, frame_id, status, service, latitude, longitude, altitude, tuple(covariance), kind)
 
 
-def decode_sentence(data: bytes) -> Sentence:
+def decode_sentence(data: bytes | memoryview) -> Sentence:
     """nmea_msgs/Sentence."""
     reader = CdrReader(data)
     stamp_ns, frame_id = reader.header()
     return Sentence(stamp_ns, frame_id, reader.string())
 
 
-def decode_video(data: bytes) -> CompressedVideo:
+def decode_video(data: bytes | memoryview) -> CompressedVideo:
     """foxglove_msgs/CompressedVideo."""
     reader = CdrReader(data)
     stamp_ns, frame_id = reader.header()
     return CompressedVideo(stamp_ns, frame_id, bytes(reader.octets()), reader.string())
 
 
-def decode_log(data: bytes) -> Log:
+def decode_log(data: bytes | memoryview) -> Log:
     """rcl_interfaces/Log."""
     reader = CdrReader(data)
     stamp_ns, level = reader.time(), reader.integer("B")
@@ -198,7 +229,7 @@ def decode_log(data: bytes) -> Log:
     return Log(stamp_ns, level, name, text, file, function, reader.integer("I"))
 
 
-def decode_diagnostics(data: bytes) -> DiagnosticArray:
+def decode_diagnostics(data: bytes | memoryview) -> DiagnosticArray:
     """diagnostic_msgs/DiagnosticArray."""
     reader = CdrReader(data)
     stamp_ns, frame_id = reader.header()
@@ -213,7 +244,7 @@ def _status(reader: CdrReader) -> Status:
     return Status(level, name, message, hardware_id, values)
 
 
-def decode_transforms(data: bytes) -> list[tuple[int, Transform]]:
+def decode_transforms(data: bytes | memoryview) -> list[tuple[int, Transform]]:
     """tf2_msgs/TFMessage as (stamp, transform)."""
     reader = CdrReader(data)
     transforms = []

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from drivers.messages import FixQuality, GnssFix, ImuSample, LidarScan, NmeaSentence, SensorEvent, Severity, VideoFrame
-from edge.recording.messages import Diagnostics, Mark
+from edge.recording.messages import Diagnostics, GnssPose, Mark, OdometryPose, Transforms
 from edge.ros.cdr import LITTLE_ENDIAN, NS_PER_S, CdrWriter
-from edge.ros.frames import CAMERA, GNSS_ANTENNA, LIDAR, Transform
+from edge.ros.frames import BASE_LINK, CAMERA, GNSS_ANTENNA, LIDAR, MAP, ODOM, Transform
 
 POINT = np.dtype(
     [
@@ -150,6 +150,24 @@ def encode_transforms(transforms: Iterable[Transform], stamp_ns: int) -> bytes:
     return writer.finish()
 
 
+def encode_odometry(pose: OdometryPose, stamp_ns: int) -> bytes:
+    """nav_msgs/Odometry; the twist's covariance is unknown (0), its rotation not told (0)."""
+    writer = CdrWriter().header(stamp_ns, ODOM).string(BASE_LINK)
+    writer.pack("d", *pose.position_m, *pose.rotation_xyzw, *pose.covariance)
+    return writer.pack("d", *pose.velocity_m_s, *([0.0] * 39)).finish()
+
+
+def encode_pose(pose: GnssPose, stamp_ns: int) -> bytes:
+    """geometry_msgs/PoseWithCovarianceStamped."""
+    writer = CdrWriter().header(stamp_ns, MAP)
+    return writer.pack("d", *pose.position_m, *pose.rotation_xyzw, *pose.covariance).finish()
+
+
+def encode_moving(message: Transforms, stamp_ns: int) -> bytes:
+    """tf2_msgs/TFMessage of `/tf`."""
+    return encode_transforms(message.transforms, stamp_ns)
+
+
 ENCODERS: dict[type, Callable[[Any, int], bytes]] = {
     LidarScan: encode_scan,
     ImuSample: encode_imu,
@@ -159,5 +177,8 @@ ENCODERS: dict[type, Callable[[Any, int], bytes]] = {
     SensorEvent: encode_event,
     Mark: encode_mark,
     Diagnostics: encode_diagnostics,
+    OdometryPose: encode_odometry,
+    GnssPose: encode_pose,
+    Transforms: encode_moving,
 }
 """Kind of message -> encoder(message, session stamp)."""

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+EARTH = "earth"
+"""Earth-centred, Earth-fixed WGS 84 (REP-105)."""
+MAP = "map"
+ODOM = "odom"
 BASE_LINK = "base_link"
 LIDAR = "livox_frame"
 CAMERA = "camera"

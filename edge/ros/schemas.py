@@ -12,6 +12,8 @@ SENTENCE = "nmea_msgs/msg/Sentence"
 COMPRESSED_VIDEO = "foxglove_msgs/msg/CompressedVideo"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 LOG = "rcl_interfaces/msg/Log"
+ODOMETRY = "nav_msgs/msg/Odometry"
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from drivers.driver import SensorHealth, SensorState
 from edge.config import Config
-from edge.control.messages import Host, Recording, Status
+from edge.control.messages import Host, Location, Recording, Status
 from edge.paths import recordings_folder
 from edge.recording.account import RecordingStatus
 from edge.recording.disk import Disk, Space, floor_bytes
@@ -63,6 +64,8 @@ class Health:
     ) -> None:
         self.notices: list[str] = []
         """Standing problems of the service itself: no live view, a file that could not be repaired."""
+        self.location: Callable[[], Location | None] = lambda: None
+        """The live pipeline's last word."""
         self._config = config
         self._supervisor = supervisor
         self._intake = intake
@@ -113,6 +116,7 @@ class Health:
             recording=self._recording(recording) if recording else None,
             verdict=self._judge.verdict,
             problems=tuple(self._problems(looked, recording, now_ns)),
+            location=self.location(),
         )
 
     def summary(self) -> str:

@@ -10,10 +10,12 @@ from functools import partial
 
 from drivers import registry
 from drivers.driver import Driver
+from edge.bus.server import BusServer
 from edge.config import Config, sensor_driver, sensor_settings, to_toml
-from edge.control.messages import Reply, Request, Status
+from edge.control.messages import Location, Reply, Request, Status
 from edge.paths import control_socket, recordings_folder
 from edge.recording.calibration import load_calibration
+from edge.recording.messages import Recordable
 from edge.recording.session import repair_leftovers
 from edge.ros.topics import channels
 from edge.service.control_server import ControlServer
@@ -52,11 +54,13 @@ class Service:
         self._config = config
         self._notifier = notifier or Notifier()
         self._live = LiveView(config) if config.live.enabled else None
-        self._intake = Intake((self._live.offer,) if self._live else ())
+        self._bus = BusServer(config, control_socket(config).parent, self._take) if config.bus.enabled else None
+        self._intake = Intake(tuple(part.offer for part in (self._live, self._bus) if part is not None))
         self._supervisor = Supervisor(driver_plans(config) if plans is None else plans, self._intake.take)
         self._judge = judge or Judge(to_toml(config))
         self._recorder = Recorder(config, self._intake, self._supervisor, self._judge)
         self._health = Health(config, self._supervisor, self._intake, self._recorder, self._judge)
+        self._health.location = self._location
         self._server = ControlServer(control_socket(config), self, config.control.group, SOFTWARE)
         self._next_look_ns = 0
         self._told = ""
@@ -90,7 +94,17 @@ class Service:
         """For the control server."""
         return self._health.status(time.monotonic_ns())
 
+    def _take(self, message: Recordable) -> None:
+        self._intake.take(message)
+
+    def _location(self) -> Location | None:
+        return self._bus.location if self._bus is not None else None
+
     def _start(self) -> None:
+        if self._bus is not None:
+            self._bus.start()
+            if self._bus.problem:
+                self._health.notices.append(self._bus.problem)
         threading.Thread(target=self._repair, name="repair", daemon=True).start()
         if self._live is not None:
             self._live.start()
@@ -107,8 +121,9 @@ class Service:
         self._supervisor.stop()
         self._server.publish(self._health.status(time.monotonic_ns()))
         self._server.stop()
-        if self._live is not None:
-            self._live.stop()
+        for part in (self._live, self._bus):
+            if part is not None:
+                part.stop()
         self._notifier.close()
 
     def _finish_session(self) -> None:

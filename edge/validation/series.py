@@ -23,7 +23,8 @@ _LATEST_NS = np.uint64(1 << 62)
 class Series:
     """The messages of one topic in file order.
 
-    times_ns: (n,) int64 log times. chunk: (n,) int32 ordinal of the chunk. offsets: (n,) int64 in the chunk's content.
+    times_ns: (n,) int64 log times. chunk: (n,) int32 ordinal of the chunk. offsets: (n,) int64 in the chunk's content;
+    outside chunks the ordinal is -1 and the offset that of the record in the file.
     """
 
     times_ns: npt.NDArray[np.int64]

@@ -47,7 +47,7 @@ class WalkedIndex(Gather):
     def _loose(self, record: Record) -> None:
         if record.opcode == Opcode.MESSAGE:
             head = self.file.read(record.content, 14)
-            entry = head[6:14] + (0).to_bytes(8, "little")
+            entry = head[6:14] + record.offset.to_bytes(8, "little")
             self.add_entries(int.from_bytes(head[:2], "little"), entry, -1)
         elif record.opcode == Opcode.ATTACHMENT:
             self.index.attachments += 1

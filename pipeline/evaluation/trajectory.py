@@ -1,149 +1,200 @@
-"""How far an estimated trajectory is from the true one: APE, RPE, drift and consistency, as `evo` defines them.
+"""How far an estimated trajectory is from the true one: APE, RPE, drift, and whether the covariance is honest.
 
-Positions (n, 3) in m, rotations (n, 3, 3), times (n,) integer ns. `associate` brings two trajectories to common times.
+Terms as in `evo` and Zhang and Scaramuzza (2018). Errors are of positions, metres, unless named otherwise.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from pathlib import Path
+from typing import Literal
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation, Slerp
 
-Doubles = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
-
-
-class Alignment(Enum):
-    """What is taken out before errors are measured. A georeferenced trajectory is compared with NONE."""
-
-    SE3 = "se3"
-    YAW = "yaw"
-    """Translation and heading: what an odometry that knows gravity leaves open."""
-    ORIGIN = "origin"
-    """The first pose is laid on the true one."""
-    NONE = "none"
+Array = npt.NDArray[np.float64]
+Alignment = Literal["none", "yaw", "se3"]
+CHI2_3_95 = 7.815
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Poses:
-    """stamp_ns (n,), position_m (n, 3), rotation (n, 3, 3) body to world."""
+class Trajectory:
+    """stamps_ns: (n,) int64, rising. positions_m: (n, 3). rotations: (n, 3, 3)."""
 
-    stamp_ns: Stamps
-    position_m: Doubles
-    rotation: Doubles
+    stamps_ns: npt.NDArray[np.int64]
+    positions_m: Array
+    rotations: Array
 
-    def __len__(self) -> int:
-        return len(self.stamp_ns)
+    def shifted(self, by_ns: int) -> Trajectory:
+        """In another clock."""
+        return Trajectory(self.stamps_ns + by_ns, self.positions_m, self.rotations)
 
-    def moved(self, turn: Doubles, shift: Doubles) -> Poses:
-        """Seen from another frame: x' = turn x + shift."""
-        return Poses(self.stamp_ns, self.position_m @ turn.T + shift, turn @ self.rotation)
+    def chosen(self, which: npt.NDArray[np.bool_]) -> Trajectory:
+        """Some of its poses."""
+        return Trajectory(self.stamps_ns[which], self.positions_m[which], self.rotations[which])
 
-    def pick(self, index: npt.NDArray[np.int64]) -> Poses:
-        """Some of them."""
-        return Poses(self.stamp_ns[index], self.position_m[index], self.rotation[index])
+    def at(self, stamps_ns: npt.NDArray[np.int64]) -> Trajectory:
+        """Between its poses; the stamps lie within it."""
+        origin = self.stamps_ns[0]
+        times, wanted = (self.stamps_ns - origin) / 1e9, (stamps_ns - origin) / 1e9
+        positions = np.column_stack([np.interp(wanted, times, axis) for axis in self.positions_m.T])
+        return Trajectory(stamps_ns, positions, Slerp(times, Rotation.from_matrix(self.rotations))(wanted).as_matrix())
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """Of a set of errors in one unit."""
+class Spread(msgspec.Struct, frozen=True):
+    """Of an error over a trajectory."""
 
     rmse: float
     mean: float
     median: float
     worst: float
 
-    @classmethod
-    def of(cls, values: Doubles) -> Errors:
-        """Of (n,) values, n >= 1."""
-        return cls(
-            float(np.sqrt(np.mean(values**2))),
-            float(np.mean(values)),
-            float(np.median(values)),
-            float(np.max(values)),
-        )
+
+class TrajectoryErrors(msgspec.Struct, frozen=True):
+    """alignment: what was done to the estimate before. NaN in what the trajectory is too short for."""
+
+    alignment: str
+    poses: int
+    length_m: float
+    """Of the true way."""
+    ape_m: Spread
+    ape_horizontal_m: Spread
+    ape_vertical_m: Spread
+    ape_deg: Spread
+    rpe_m: Spread
+    """Over stretches of `rpe_over_m` of the true way."""
+    rpe_deg: Spread
+    rpe_over_m: float
+    end_m: float
+    drift_percent: float
+    """Error at the end with the starts laid together, of the length."""
+    nees: float = float("nan")
+    """Mean normalised squared error of position: 1 is honest, above is overconfident. Without alignment only."""
+    within_95: float = float("nan")
+    """Share of positions within the 95 % ellipsoid."""
 
 
-def associate(estimate: Poses, truth: Poses, apart_ns: int = 20_000_000) -> tuple[Poses, Poses]:
-    """The pairs that are nearest in time, none farther apart. ValueError when there are fewer than two."""
-    after = np.clip(np.searchsorted(truth.stamp_ns, estimate.stamp_ns), 1, len(truth) - 1)
-    early = estimate.stamp_ns - truth.stamp_ns[after - 1] < truth.stamp_ns[after] - estimate.stamp_ns
-    nearest = after - early
-    near = np.abs(truth.stamp_ns[nearest] - estimate.stamp_ns) <= apart_ns
-    if near.sum() < 2:
-        raise ValueError("the trajectories share less than two instants: are they in the same time?")
-    return estimate.pick(np.flatnonzero(near)), truth.pick(nearest[near])
+def read_tum(path: Path) -> Trajectory:
+    """`t x y z qx qy qz qw` a line. ValueError for what is none."""
+    rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    if not rows or any(len(row) != 8 for row in rows):
+        raise ValueError(f"{path}: not a trajectory in the TUM format (eight numbers a line)")
+    values = np.array([row[1:] for row in rows], dtype=np.float64)
+    stamps = np.array([_nanoseconds(row[0]) for row in rows], dtype=np.int64)
+    kept = np.concatenate([[True], np.diff(stamps) > 0])
+    return Trajectory(stamps[kept], values[kept, :3], Rotation.from_quat(values[kept, 3:]).as_matrix())
 
 
-def align(estimate: Poses, truth: Poses, alignment: Alignment) -> Poses:
-    """The estimate moved onto the truth, pose by pose the same instants (Umeyama without scale)."""
-    if alignment is Alignment.NONE:
+def trajectory_errors(
+    estimate: Trajectory,
+    truth: Trajectory,
+    alignment: Alignment = "none",
+    *,
+    covariance: Array | None = None,
+    rpe_over_m: float = 100.0,
+) -> TrajectoryErrors:
+    """Both in one clock. covariance: (n, 3, 3) of the estimate's positions. ValueError without an overlap."""
+    within = (estimate.stamps_ns >= truth.stamps_ns[0]) & (estimate.stamps_ns <= truth.stamps_ns[-1])
+    if within.sum() < 3:
+        raise ValueError("the trajectories do not overlap in time")
+    estimate, covariance = estimate.chosen(within), covariance[within] if covariance is not None else None
+    true = truth.at(estimate.stamps_ns)
+    moved = aligned(estimate, true, alignment)
+    away = moved.positions_m - true.positions_m
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(true.positions_m, axis=0), axis=1))])
+    along, turned = relative_errors(moved, true, way, rpe_over_m)
+    end_m = float(np.linalg.norm(_from_start(moved)[-1] - _from_start(true)[-1]))
+    nees, within_95 = _honesty(away, covariance) if covariance is not None and alignment == "none" else (np.nan,) * 2
+    return TrajectoryErrors(
+        alignment=alignment,
+        poses=len(away),
+        length_m=float(way[-1]),
+        ape_m=_spread(np.linalg.norm(away, axis=1)),
+        ape_horizontal_m=_spread(np.linalg.norm(away[:, :2], axis=1)),
+        ape_vertical_m=_spread(np.abs(away[:, 2])),
+        ape_deg=_spread(_angles_deg(moved.rotations, true.rotations)),
+        rpe_m=_spread(along),
+        rpe_deg=_spread(turned),
+        rpe_over_m=rpe_over_m,
+        end_m=end_m,
+        drift_percent=100.0 * end_m / float(way[-1]) if way[-1] > 0 else float("nan"),
+        nees=float(nees),
+        within_95=float(within_95),
+    )
+
+
+def aligned(estimate: Trajectory, true: Trajectory, alignment: Alignment) -> Trajectory:
+    """The estimate laid over the truth with the least squares of positions (Umeyama 1991, without scale)."""
+    if alignment == "none":
         return estimate
-    if alignment is Alignment.ORIGIN:
-        turn = truth.rotation[0] @ estimate.rotation[0].T
-        return estimate.moved(turn, truth.position_m[0] - turn @ estimate.position_m[0])
-    middle, goal = estimate.position_m.mean(axis=0), truth.position_m.mean(axis=0)
-    cross = (truth.position_m - goal).T @ (estimate.position_m - middle)
-    turn = _yaw(cross) if alignment is Alignment.YAW else _turn(cross)
-    return estimate.moved(turn, goal - turn @ middle)
+    middle, goal = estimate.positions_m.mean(axis=0), true.positions_m.mean(axis=0)
+    cross = (true.positions_m - goal).T @ (estimate.positions_m - middle)
+    turn = _yaw(cross) if alignment == "yaw" else _turn(cross)
+    positions = (estimate.positions_m - middle) @ turn.T + goal
+    return Trajectory(estimate.stamps_ns, positions, turn @ estimate.rotations)
 
 
-def position_errors(estimate: Poses, truth: Poses) -> Doubles:
-    """Distance (n,) between the positions, m."""
-    return np.asarray(np.linalg.norm(estimate.position_m - truth.position_m, axis=1))
+def relative_errors(estimate: Trajectory, true: Trajectory, way_m: Array, over_m: float) -> tuple[Array, Array]:
+    """(k,) metres and (k,) degrees over stretches of `over_m`, from every pose with so much before it."""
+    ends = np.searchsorted(way_m, way_m + over_m)
+    starts = np.flatnonzero(ends < len(way_m))
+    ends = ends[starts]
+    steps = []
+    for one in (estimate, true):
+        back = one.rotations[starts].transpose(0, 2, 1)
+        steps.append(
+            (
+                np.einsum("nij,nj->ni", back, one.positions_m[ends] - one.positions_m[starts]),
+                back @ one.rotations[ends],
+            )
+        )
+    (moved, turned), (moved_true, turned_true) = steps
+    # Of the relative pose error Q^-1 P the translation has the length of this difference.
+    return np.linalg.norm(moved - moved_true, axis=1), _angles_deg(turned, turned_true)
 
 
-def ape(estimate: Poses, truth: Poses, alignment: Alignment) -> Errors:
-    """Absolute position error, m."""
-    return Errors.of(position_errors(align(estimate, truth, alignment), truth))
+def _honesty(away: Array, covariance: Array) -> tuple[float, float]:
+    squared = np.einsum("ni,ni->n", away, np.linalg.solve(covariance, away[..., None])[..., 0])
+    return float(squared.mean() / 3.0), float((squared < CHI2_3_95).mean())
 
 
-def rpe(estimate: Poses, truth: Poses, distance_m: float) -> tuple[Errors, Errors] | None:
-    """Relative error over every stretch of that length of the true way: m, and degrees. None where it is too short."""
-    begin, end = _stretches(truth, distance_m)
-    if len(begin) == 0:
-        return None
-    moved, turned = _between(estimate, begin, end)
-    true_moved, true_turned = _between(truth, begin, end)
-    error = np.einsum("nji,nj->ni", true_turned, moved - true_moved)
-    rest = np.einsum("nji,njk->nik", true_turned, turned)
-    cosine = np.clip(0.5 * (np.trace(rest, axis1=1, axis2=2) - 1.0), -1.0, 1.0)
-    return Errors.of(np.linalg.norm(error, axis=1)), Errors.of(np.degrees(np.arccos(cosine)))
+def _from_start(one: Trajectory) -> Array:
+    """Positions as seen from the first pose."""
+    return np.asarray((one.positions_m - one.positions_m[0]) @ one.rotations[0])
 
 
-def length_m(poses: Poses) -> float:
-    """Length of the way."""
-    return float(np.linalg.norm(np.diff(poses.position_m, axis=0), axis=1).sum())
+def _yaw(cross: Array) -> Array:
+    angle = float(np.arctan2(cross[1, 0] - cross[0, 1], cross[0, 0] + cross[1, 1]))
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], np.float64)
 
 
-def nees(error: Doubles, covariance: Doubles) -> Doubles:
-    """Normalised estimation error squared (n,) of errors (n, k): k on average where the covariance is honest."""
-    return np.asarray(np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[:, :, None])[:, :, 0]))
+def _turn(cross: Array) -> Array:
+    u, _, v = np.linalg.svd(cross)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)
 
 
-def _turn(cross: Doubles) -> Doubles:
-    left, _, right = np.linalg.svd(cross)
-    sign = np.diag([1.0, 1.0, float(np.sign(np.linalg.det(left @ right)))])
-    return np.asarray(left @ sign @ right)
+def _angles_deg(one: Array, other: Array) -> Array:
+    if not len(one):
+        return np.empty(0)
+    turns = Rotation.from_matrix(one.transpose(0, 2, 1) @ other).magnitude()
+    return np.degrees(np.asarray(turns, np.float64))
 
 
-def _yaw(cross: Doubles) -> Doubles:
-    yaw = np.arctan2(cross[1, 0] - cross[0, 1], cross[0, 0] + cross[1, 1])
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+def _spread(errors: Array) -> Spread:
+    if not len(errors):
+        return Spread(*[float("nan")] * 4)
+    return Spread(
+        float(np.sqrt(np.mean(errors**2))), float(errors.mean()), float(np.median(errors)), float(errors.max())
+    )
 
 
-def _stretches(truth: Poses, distance_m: float) -> tuple[Stamps, Stamps]:
-    steps = np.linalg.norm(np.diff(truth.position_m, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    end = np.searchsorted(along, along + distance_m)
-    begin = np.flatnonzero(end < len(along))
-    return begin, end[begin]
-
-
-def _between(poses: Poses, begin: Stamps, end: Stamps) -> tuple[Doubles, Doubles]:
-    back = np.swapaxes(poses.rotation[begin], 1, 2)
-    moved = np.einsum("nij,nj->ni", back, poses.position_m[end] - poses.position_m[begin])
-    return moved, np.asarray(back @ poses.rotation[end])
+def _nanoseconds(text: str) -> int:
+    """Exactly, where the text has the digits: a double has none left for nanoseconds."""
+    whole, _, rest = text.partition(".")
+    if not rest or not (whole.lstrip("-").isdecimal() and rest.isdecimal()):
+        return round(float(text) * 1e9)
+    sign = -1 if whole.startswith("-") else 1
+    return int(whole) * 1_000_000_000 + sign * int(rest[:9].ljust(9, "0"))

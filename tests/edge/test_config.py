@@ -136,7 +136,9 @@ def test_the_sample_file_says_every_key_and_every_default() -> None:
     raw = toml_table.read(SAMPLE)
     del raw["sensors"]
     assert toml_table.convert(raw, Config, str(SAMPLE)) == Config()
-    assert keys(raw) == keys(msgspec.to_builtins(Config())) - {"sensors"}
+    # The estimators' settings are no operator's business: their own documents list them.
+    known = {key for key in keys(msgspec.to_builtins(Config())) if not key.startswith(("odometry.", "fusion."))}
+    assert keys(raw) == known - {"sensors", "odometry", "fusion"}
 
 
 @pytest.mark.usefixtures("real_drivers")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.control.messages import Clock, Gnss, Reply, Request, Stream, Verdict
+from edge.control.messages import Clock, Gnss, Location, Reply, Request, Stream, Verdict
 from ui import samples
 from ui.answers import answer, goodbye, noted
 from ui.faults import faults
@@ -21,7 +21,7 @@ from ui.situation import Link, Situation
 from ui.sparks import BARS, sparkline
 from ui.tone import SYMBOLS, Tone, worst
 from ui.verdict import verdict_lines
-from ui.vitals import LABELS, gnss_line, gnss_tone, vitals
+from ui.vitals import LABELS, gnss_line, gnss_tone, location_line, vitals
 
 GOOD = Situation(Link.ONLINE, samples.GOOD)
 
@@ -258,3 +258,16 @@ def test_fit_shows_that_something_was_cut():
     assert fit("abcdef", 4) == "abc…"
     assert fit("abcd", 4) == "abcd"
     assert fit("abcd", 0) == ""
+
+
+LOCATION = Location("tracking", 812.4, 1.3, 0.42, (12.34, -5.0, 1.0), True, 0, 1.0, 0.1)
+
+
+def test_the_pose_says_way_speed_and_sigma_and_what_was_left_out():
+    assert "TRACKING" in text_of(location_line(LOCATION))
+    assert "812 m  1.3 m/s  ±0.42 m map  +12.3 -5.0 +1.0" in text_of(location_line(LOCATION))
+    behind = changed(LOCATION, thinned=0.4, dropped=7)
+    assert "40% of the points, 7 sweeps left out" in text_of(location_line(behind))
+    starting = changed(LOCATION, state="starting", note="keep still for a moment")
+    assert text_of(location_line(starting)).endswith("keep still for a moment")
+    assert any(Tone.BAD.badge == style for _, style in location_line(changed(LOCATION, state="lost")))

@@ -11,7 +11,7 @@ from ui.history import History
 from ui.pieces import Pieces, plain
 from ui.sensors import columns, header, rows
 from ui.situation import Situation
-from ui.vitals import gnss_line
+from ui.vitals import gnss_line, location_line
 from ui.widgets.line import Line
 
 ROWS = 24
@@ -53,7 +53,10 @@ class SensorTable(VerticalScroll, can_focus=False):
     def _lines(self, situation: Situation, history: History) -> list[Pieces]:
         widths = columns(self.app.size.width - 3)
         status = situation.status
-        lines = [gnss_line(status.gnss if status else None), header(widths)]
+        lines = [gnss_line(status.gnss if status else None)]
+        if status is not None and status.location is not None:
+            lines.append(location_line(status.location))
+        lines.append(header(widths))
         for sensor in status.sensors if status else ():
             if self.app.size.height >= TALL:
                 lines.append(plain(""))

@@ -1,0 +1,152 @@
+"""The work on one recording: three stages, each kept when finished, each redone when what it was made from changed."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from edge import __version__
+from edge.config import Config
+from edge.errors import EdgeError
+from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
+from edge.process.estimators import Estimators, estimators, fusion_config, odometry_config
+from edge.process.fusion_stage import FusionStage
+from edge.process.odometry_stage import OdometryFacts, OdometryStage
+from edge.process.products_stage import ProductFacts, ProductsStage
+from edge.process.watch import Watch
+from edge.replay.replay import Replay, ReplayOptions
+from edge.validation.files import recording_files
+
+STAGES = ("odometry", "fusion", "products")
+ANTENNA = "antenna.json"
+"""Where the recording says the antenna is: the fusion does not open it again."""
+_FORMAT = 1
+"""Of the files between the stages."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is asked. targets: a session's folder or .mcap files. output: None puts products beside the recording."""
+
+    targets: Sequence[Path]
+    output: Path | None = None
+    gnss: bool = True
+    fresh: bool = False
+    """Do everything again."""
+    replay: ReplayOptions = field(default_factory=ReplayOptions)
+
+    @property
+    def folder(self) -> Path:
+        """Where the products go: `products/` in a session's folder, `<name>_products/` beside a file."""
+        if self.output is not None:
+            return self.output
+        first = self.targets[0]
+        return first / "products" if first.is_dir() else first.with_name(f"{first.name.partition('.')[0]}_products")
+
+    @property
+    def session(self) -> str:
+        """The recording's name."""
+        first = self.targets[0].absolute()
+        return first.name if first.is_dir() else first.name.partition(".")[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """redone: the stages that had to be done in this run."""
+
+    folder: Path
+    facts: ProductFacts
+    redone: tuple[str, ...]
+
+
+def process(
+    task: Task, config: Config, watch: Watch | None = None, load: Callable[[], Estimators] = estimators
+) -> Done:
+    """Odometry, fusion, products. FormatError for what cannot be used, EdgeError where nothing could be estimated."""
+    files = recording_files(task.targets)
+    work = task.folder / "work"
+    with alone(_made(work)):
+        return _Work(task, config, watch or Watch(), load, Checkpoint(work), fingerprint(files)).run()
+
+
+@dataclass
+class _Work:
+    task: Task
+    config: Config
+    watch: Watch
+    load: Callable[[], Estimators]
+    checkpoint: Checkpoint
+    prints: list[tuple[str, int, str]]
+    redone: list[str] = field(default_factory=list)
+
+    def run(self) -> Done:
+        if self.task.fresh:
+            for stage in STAGES:
+                self.checkpoint.begin(stage)
+        keys = self._keys()
+        self._stage("odometry", keys[0], self._odometry)
+        self._stage("fusion", keys[1], self._fusion)
+        self._stage("products", keys[2], self._products, [self.task.folder / "products.json"])
+        facts = msgspec.json.decode((self.task.folder / "products.json").read_bytes(), type=ProductFacts)
+        return Done(self.task.folder, facts, tuple(self.redone))
+
+    def _keys(self) -> tuple[str, str, str]:
+        options = self.task.replay
+        pose = None if options.lidar_pose is None else options.lidar_pose.tolist()
+        wanted = options.wanted
+        asked = [wanted.lidar, wanted.imu, wanted.fix, options.time_field, pose, self.task.gnss]
+        settings = [self.config.odometry, self.config.products, self.config.topics, self.config.calibration]
+        first = key_of(_FORMAT, __version__, self.prints, asked, settings)
+        second = key_of(first, self.config.fusion)
+        return first, second, key_of(second, self.task.session)
+
+    def _stage(self, name: str, key: str, run: Callable[[Path], object], outputs: Sequence[Path] = ()) -> None:
+        done = self.checkpoint.done(name, key, outputs)
+        self.watch.stage(name, done=done)
+        if not done:
+            run(self.checkpoint.begin(name))
+            self.checkpoint.finish(name, key)
+            self.redone.append(name)
+
+    def _odometry(self, folder: Path) -> None:
+        replay = Replay(self.task.targets, self.config, self.task.replay)
+        built = self.load().odometry(odometry_config(self.config, replay.geometry))
+        (folder / ANTENNA).write_bytes(msgspec.json.encode(fusion_config(self.config, replay.geometry).antenna_m))
+        facts = OdometryStage(replay, built, self.config.products, self.task.gnss).run(folder, self.watch.advance)
+        if not facts.estimates:
+            raise EdgeError(_nothing(self.task.session, facts))
+
+    def _fusion(self, folder: Path) -> None:
+        odometry = self.checkpoint.folder / "odometry"
+        antenna = msgspec.json.decode((odometry / ANTENNA).read_bytes(), type=tuple[float, float, float])
+        config = msgspec.structs.replace(self.config.fusion, antenna_m=antenna)
+        FusionStage(odometry, self.load().smooth, config).run(folder, self.watch.advance)
+
+    def _products(self, _folder: Path) -> None:
+        software = f"mapforest {__version__}"
+        voxel_m = self.config.products.voxel_m
+        ProductsStage(self.checkpoint.folder, self.task.folder, voxel_m, self.task.session, software).run(
+            self.watch.advance
+        )
+
+
+def clean(task: Task) -> None:
+    """Take the files between the stages away: a later run starts from the beginning."""
+    shutil.rmtree(task.folder / "work", ignore_errors=True)
+
+
+def _nothing(session: str, facts: OdometryFacts) -> str:
+    why = "; ".join(f"{note} ({count} times)" for note, count in facts.refusals.items()) or "there were no sweeps"
+    return f"{session}: no pose could be estimated from {facts.sweeps} sweeps: {why}"
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EdgeError(f"{folder}: cannot be made ({error.strerror}); give another place with --output") from error
+    return folder

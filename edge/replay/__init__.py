@@ -1,0 +1,1 @@
+"""Any recording with a LiDAR and an IMU as the drivers' messages, in order of time."""

@@ -1,0 +1,99 @@
+"""The map as LAZ 1.4, written tile by tile (ASPRS LAS 1.4 R15, point format 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import laspy
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.products.earth import Site
+from pipeline.products.tiles import Tile, read_tile, tiles
+from pipeline.products.track import Placement
+
+SCALE_M = 0.001
+_AT_ONCE = 250_000
+"""Points: about 100 bytes each on the way."""
+_GPS_EPOCH_S = 315_964_800
+_LEAP_S = 18
+"""GPS minus UTC, since 2017; none is announced."""
+_ADJUSTED_S = 1_000_000_000
+"""Adjusted standard GPS time counts from a billion seconds after the epoch (LAS 1.4, 2.4.1)."""
+_LOCAL = "coordinates are local: metres from the start of the session, z up, heading arbitrary; no CRS"
+
+
+@dataclass(frozen=True, slots=True)
+class MapSource:
+    """What the map is made from. stamps_ns: (n,), sigma_m: (n,) horizontal sigma of the pose of each sweep."""
+
+    tiles: Path
+    voxel_m: float
+    stamps_ns: npt.NDArray[np.int64]
+    sigma_m: npt.NDArray[np.float64]
+    placement: Placement | None
+    session: str
+
+
+def write_laz(path: Path, source: MapSource, advance: Callable[[float], None]) -> int:
+    """Write to `path`; returns the number of points. One tile is in memory at a time."""
+    found = tiles(source.tiles)
+    site = Site(source.placement.datum) if source.placement is not None else None
+    count = 0
+    header = _header(source, site, found)
+    with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
+        for number, tile in enumerate(found):
+            points = read_tile(source.tiles, tile, source.voxel_m)
+            for start in range(0, len(points), _AT_ONCE):
+                writer.write_points(_record(points[start : start + _AT_ONCE], header, source, site))
+            count += len(points)
+            advance((number + 1) / len(found))
+    return count
+
+
+def _header(source: MapSource, site: Site | None, found: list[Tile]) -> laspy.LasHeader:
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = np.full(3, SCALE_M)
+    header.offsets = np.zeros(3)
+    if site is not None and found:
+        assert source.placement is not None
+        header.offsets = np.floor(site.utm(np.zeros((1, 3)))[0])
+    header.generating_software = "mapforest"
+    header.system_identifier = "mapforest LiDAR map"
+    header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
+    header.add_extra_dims(
+        [
+            laspy.ExtraBytesParams("sweep", "uint32", "ordinal in the trajectory"),
+            laspy.ExtraBytesParams("sigma_m", "float32", "of the pose, horizontal"),
+        ]
+    )
+    about = f"session {source.session}; " + ("heights above the WGS 84 ellipsoid" if site else _LOCAL)
+    header.vlrs.append(laspy.VLR("LASF_Spec", 3, "Text Area Description", about.encode()[:65_000]))
+    if site is not None:
+        header.add_crs(site.crs)
+    return header
+
+
+def _record(
+    points: npt.NDArray[np.void], header: laspy.LasHeader, source: MapSource, site: Site | None
+) -> laspy.ScaleAwarePointRecord:
+    sweeps = points["sweep"].astype(np.int64)
+    xyz = points["xyz"].astype(np.float64)
+    if source.placement is not None and site is not None:
+        xyz = site.utm_nearby(source.placement.points(xyz, sweeps))
+    record = laspy.ScaleAwarePointRecord.zeros(len(points), header=header)
+    record.x, record.y, record.z = xyz.T
+    record.intensity = points["intensity"].astype(np.uint16) * 257
+    record.return_number[:] = 1
+    record.number_of_returns[:] = 1
+    record.gps_time = adjusted_gps_s(source.stamps_ns[sweeps])
+    record["sweep"] = points["sweep"]
+    record["sigma_m"] = source.sigma_m[sweeps].astype(np.float32)
+    return record
+
+
+def adjusted_gps_s(utc_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """(n,) seconds as LAS wants them."""
+    return np.asarray((utc_ns - (_GPS_EPOCH_S - _LEAP_S + _ADJUSTED_S) * 1_000_000_000) / 1e9)

@@ -1,0 +1,90 @@
+"""A processed session is compared with the simulated truth in its time and at its place."""
+
+from __future__ import annotations
+
+import json
+
+import msgspec
+import numpy as np
+import pytest
+
+from edge.cli.main import main
+from edge.errors import FormatError
+from edge.process.against_truth import compare
+from edge.process.products_stage import ProductFacts
+from pipeline.gnss.geodesy import Datum
+from pipeline.products.covariance import read_covariance, write_covariance
+from pipeline.products.track import ESTIMATE
+from pipeline.products.tum import write_tum
+
+WORLD, HERE = Datum(40.0, -75.0, 58.0), Datum(40.0002, -75.0003, 61.0)
+EPOCH_NS, OFFSET_NS = 5_000_000_000, 1_790_000_000_000_000_000
+COUNT = 300
+
+
+@pytest.fixture
+def truth(tmp_path):
+    folder = tmp_path / "truth"
+    folder.mkdir()
+    stamps = np.arange(COUNT) * 10**8
+    write_tum(folder / "poses.tum", stamps, positions(), np.tile(np.eye(3), (COUNT, 1, 1)))
+    datum = {"latitude_deg": WORLD.latitude_deg, "longitude_deg": WORLD.longitude_deg, "height_m": WORLD.height_m}
+    (folder / "world.json").write_text(json.dumps({"datum": datum}))
+    (folder / "epoch.json").write_text(json.dumps({"monotonic_ns": EPOCH_NS}))
+    return folder
+
+
+def positions() -> np.ndarray:
+    angles = np.linspace(0, 2 * np.pi, COUNT)
+    return np.column_stack([30 * np.cos(angles), 30 * np.sin(angles), np.sin(angles)])
+
+
+@pytest.fixture
+def session(tmp_path):
+    products = tmp_path / "walk" / "products"
+    products.mkdir(parents=True)
+    stamps = np.arange(COUNT) * 10**8 + EPOCH_NS + OFFSET_NS
+    off = np.array([0.1, -0.2, 0.3])
+    here = np.array([HERE.enu(*WORLD.geodetic(one + off)) for one in positions()])
+    level = np.tile(np.eye(3), (COUNT, 1, 1))
+    write_tum(products / "trajectory.tum", stamps, here, level)
+    write_tum(products / "trajectory_odom.tum", stamps, positions() - positions()[0], level)
+    track = np.zeros(COUNT, ESTIMATE)
+    track["stamp_ns"] = stamps
+    covariance = np.tile(np.diag([0.04, 0.04, 0.09, 0, 0, 0]), (COUNT, 1, 1))
+    covariance[:, 0, 1] = covariance[:, 1, 0] = -0.01
+    write_covariance(products / "covariance.csv", "map", track, here, covariance)
+    np.testing.assert_allclose(read_covariance(products / "covariance.csv")[1], covariance[:, :3, :3], rtol=1e-5)
+    datum = (HERE.latitude_deg, HERE.longitude_deg, HERE.height_m)
+    facts = ProductFacts("walk", "map", "EPSG:32618", datum=datum, host_offset_ns=OFFSET_NS)
+    (products / "products.json").write_bytes(msgspec.json.encode(facts))
+    return tmp_path / "walk"
+
+
+def test_time_and_datum_are_those_of_the_truth(session, truth):
+    found = {(one.trajectory, one.errors.alignment): one.errors for one in compare(session, truth, 20.0)}
+    assert list(found) == [("map", "none"), ("map", "yaw"), ("map", "se3"), ("odom", "yaw"), ("odom", "se3")]
+    assert found["map", "none"].ape_m.rmse == pytest.approx(0.14**0.5, abs=2e-3)
+    assert found["map", "none"].ape_vertical_m.rmse == pytest.approx(0.3, abs=2e-3)
+    expected = np.array([0.1, -0.2, 0.3]) @ np.linalg.inv([[0.04, -0.01, 0], [-0.01, 0.04, 0], [0, 0, 0.09]])
+    assert found["map", "none"].nees == pytest.approx(expected @ [0.1, -0.2, 0.3] / 3, rel=0.02)
+    assert found["odom", "yaw"].ape_m.rmse < 1e-5
+    assert found["map", "yaw"].ape_m.rmse < 2e-3
+
+
+def test_the_command_prints_a_table_and_json(session, truth, capsys):
+    assert main(["evaluate", "trajectory", str(session), "--truth", str(truth), "--over", "20"]) == 0
+    assert "RPE over 20 m" in capsys.readouterr().out
+    tum = session / "products" / "trajectory_odom.tum"
+    assert main(["evaluate", "trajectory", str(tum), "--truth", str(tum), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["errors"]["ape_m"]["worst"] == 0
+
+
+def test_what_cannot_be_compared_is_said(session, truth, tmp_path):
+    with pytest.raises(FormatError, match="not processed yet"):
+        compare(tmp_path, truth)
+    with pytest.raises(FormatError, match="the truth is a TUM file"):
+        compare(session / "products" / "trajectory.tum", truth)
+    (truth / "epoch.json").unlink()
+    with pytest.raises(FormatError, match="not what the emulated payload writes"):
+        compare(session, truth)
