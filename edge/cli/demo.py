@@ -17,18 +17,24 @@ from drivers.sim.scenarios import scenario
 from edge import demo
 from edge.cli import exit_codes
 from edge.cli.ending import end_with_the_terminal
-from edge.cli.evaluate import clock_table
+from edge.cli.evaluate import clock_table, trajectory_table
+from edge.cli.stage_bar import StageBar
+from edge.config import load
 from edge.control.client import ControlClient
 from edge.control.messages import Status, Verdict
+from edge.process.against_truth import Compared, compare
+from edge.process.process import Done, Task, process
 from edge.validation.clock_truth import ClockReport, clock_reports
 
-HELP = """the whole mission on the emulated payload: record a walk, validate it, compare with the truth
+HELP = """the whole mission on the emulated payload: record a walk, validate it, locate it, compare with the truth
 
 example: mapforest demo --seed 3
          mapforest demo --tui      (press the keys yourself: space starts, space twice stops, q leaves)
 
 Three emulated sensors speak their real protocols from one simulated forest; a recorder records them as on the
 payload. The outputs stay in the folder demo/."""
+RPE_OVER_M = 10.0
+"""The walk of the demonstration is 43 m long."""
 _EXIT = {"PASS": exit_codes.GOOD, "WARN": exit_codes.WARNINGS, "FAIL": exit_codes.FAILED}
 
 
@@ -53,11 +59,16 @@ def run(args: argparse.Namespace) -> int:
             _operate(stage)
             return exit_codes.GOOD
         folder, verdict = _mission(client, payload, console)
+    done, poses = _locate(folder, stage, quiet=args.json)
     reports = clock_reports(folder, stage.truth)
     if args.json:
-        print(msgspec.json.encode({"session": str(folder), "verdict": verdict, "clocks": reports}).decode())
+        told = {"session": str(folder), "verdict": verdict, "clocks": reports, "trajectory": poses}
+        print(msgspec.json.encode(told).decode())
     else:
+        console.print(trajectory_table(poses))
         _conclude(console, folder, verdict, reports)
+        for name, meaning in done.facts.files.items():
+            console.print(f"product     {name}  {meaning}", highlight=False)
     return _EXIT[verdict.verdict]
 
 
@@ -66,6 +77,13 @@ def _mission(client: ControlClient, payload: Payload, console: Console) -> tuple
         demo.wait_for_sensors(client, screen.show)
         folder = demo.record_walk(client, payload, screen.show)
         return folder, demo.wait_for_verdict(client, screen.show)
+
+
+def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list[Compared]]:
+    """The onboard pipeline over the recording, and its poses beside the true ones."""
+    with StageBar(quiet=quiet) as bar:
+        done = process(Task([folder]), load(stage.config), bar)
+    return done, compare(folder, stage.truth, RPE_OVER_M)
 
 
 def _operate(stage: demo.Stage) -> None:

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 
 import msgspec
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from edge.cli import exit_codes
+from edge.cli.stage_bar import StageBar
 from edge.cli.words import console, duration
 from edge.config import load
 from edge.errors import UsageError
-from edge.process.watch import Watch
 
 if TYPE_CHECKING:  # heavy: numpy, numba
     from edge.process.products_stage import ProductFacts
@@ -59,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     options = ReplayOptions(Wanted(args.lidar, args.imu, args.fix), args.time_field, _pose(args.lidar_pose))
     task = Task(args.recording, args.output, not args.no_gnss, args.fresh, options)
     out = console(stderr=args.json)
-    with _Bar(quiet=args.json) as bar:
+    with StageBar(quiet=args.json) as bar:
         done = process(task, load(args.config), bar)
     if args.clean:
         clean(task)
@@ -101,42 +100,3 @@ def _pose(text: str | None) -> Matrix | None:
     if len(numbers) != 7 or abs(sum(value * value for value in numbers[3:]) - 1.0) > 1e-3:
         raise UsageError(f"--lidar-pose {text}: seven numbers are expected, x,y,z and a unit quaternion qx,qy,qz,qw")
     return pose_matrix(numbers[:3], numbers[3:])
-
-
-class _Bar(Watch):
-    """One bar a stage, on standard error."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self._progress = Progress(
-            TextColumn("{task.description:<9}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=console(stderr=True),
-            disable=quiet,
-        )
-        self._task: TaskID | None = None
-
-    def __enter__(self) -> _Bar:
-        self._progress.start()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._finish()
-        self._progress.stop()
-
-    def stage(self, name: str, *, done: bool) -> None:
-        """The next one."""
-        self._finish()
-        self._task = self._progress.add_task(name, total=1.0, completed=int(done))
-
-    def advance(self, share: float) -> None:
-        """0..1 of it."""
-        if self._task is not None:
-            self._progress.update(self._task, completed=min(share, 1.0))
-
-    def _finish(self) -> None:
-        self.advance(1.0)

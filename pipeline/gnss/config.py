@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
 
 import msgspec
-import numpy as np
-
-from pipeline.estimates import Array
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -54,10 +50,6 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Fixes closer than that to the last used one are left out: their errors are the same."""
     history_s: Positive = 30.0
     """How late a fix may come."""
-
-    def drift(self) -> Array:
-        """(4,) variance of x, y, z, yaw a metre."""
-        return np.array([self.drift_m, self.drift_m, self.drift_up_m, math.radians(self.drift_yaw_deg)]) ** 2
 
     def scaled(self, scale: float) -> FusionConfig:
         """The same with another drift."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.estimates import Array
 from pipeline.gnss import belief as small
 from pipeline.gnss.alignment import Alignment
@@ -42,7 +44,8 @@ class Tracker:
         covariance = widened**2 * alignment.covariance_at(first.antenna_m)
         self.belief = small.started(alignment.to_map(first.antenna_m), alignment.yaw, covariance, trust.lasting_m)
         self.passage = first
-        self.drift = config.drift()
+        self.drift = _drift(config)
+        """(4,) variance of x, y, z, yaw a metre."""
         self._trust = trust
         self._config = config
         self._rejected_ns: list[int] = []
@@ -89,3 +92,8 @@ def _doubting(belief: Belief, new: Innovation) -> Belief:
     covariance[range(3), range(3)] += (new.value / DOUBT_SIGMAS) ** 2
     covariance[YAW, YAW] += DOUBT_YAW**2
     return Belief(belief.mean, covariance)
+
+
+def _drift(config: FusionConfig) -> Array:
+    yaw = math.radians(config.drift_yaw_deg)
+    return np.array([config.drift_m, config.drift_m, config.drift_up_m, yaw]) ** 2
