@@ -41,7 +41,9 @@ class MapConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Residuals of a scan against the map."""
 
-    leaf_m: float = 0.2
+    leaf_m: float = 0.3
+    most: int = 2500
+    """So many clusters of a scan are matched; all are put into the map."""
     fewest_points: int = 6
     floor_m: float = 0.015
     """Error shared by all points of a cluster and its voxel: pose at insertion, deskewing, shape."""

@@ -58,13 +58,13 @@ def side(dx: float, dy: float) -> int:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def scatter_slot(key: int, mask: int) -> int:
+def scatter_slot(key: int, mask: int) -> np.int64:
     """First place of a key in a table of mask + 1 places: the finaliser of MurmurHash3."""
     h = np.uint64(key)
     h ^= h >> np.uint64(33)
     h *= np.uint64(0xFF51AFD7ED558CCD)
     h ^= h >> np.uint64(33)
-    return int(h & np.uint64(mask))
+    return np.int64(h & np.uint64(mask))
 
 
 @njit(cache=True, nogil=True)
