@@ -57,9 +57,7 @@ class Tracker:
         # A scan that does not fit would spoil the map that it is to be found in again.
         if update is None or self._fits(update, len(sample)):
             self.map.insert(clusters, self.filter.state.rotation, self.filter.state.position_m)
-        return Registration(
-            Cloud(points.astype(np.float32), index), _residuals(len(index), len(sample), update), seen
-        )
+        return Registration(Cloud(points.astype(np.float32), index), _residuals(len(index), len(sample), update), seen)
 
     def _usable(self, scan: LidarScan) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         config = self._config

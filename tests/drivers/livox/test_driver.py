@@ -118,7 +118,7 @@ def test_clock_step_is_an_event_and_no_loss(step_s):
         streaming(rig, 5)
         health = rig.health()
     (event,) = [text for text in rig.events if "jumped" in text]
-    assert float(event.split()[-2]) == pytest.approx(step_s, abs=0.02)
+    assert float(event.split()[-2]) == pytest.approx(step_s, abs=0.4)
     assert [stream.lost for stream in health.streams] == [0, 0]
     for scan in rig.scans:
         assert 0 < scan.receive_ns - scan.stamp_ns < 0.2e9  # stamps stay those of the host
