@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import logging
 from pathlib import Path
 
 import msgspec
@@ -67,8 +68,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         console.print(trajectory_table(poses))
         _conclude(console, folder, verdict, reports)
+        console.print(f"products    {done.folder}", highlight=False)
         for name, meaning in done.facts.files.items():
-            console.print(f"product     {name}  {meaning}", highlight=False)
+            console.print(f"            {name}  {meaning}", highlight=False)
     return _EXIT[verdict.verdict]
 
 
@@ -81,6 +83,7 @@ def _mission(client: ControlClient, payload: Payload, console: Console) -> tuple
 
 def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list[Compared]]:
     """The onboard pipeline over the recording, and its poses beside the true ones."""
+    logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     with StageBar(quiet=quiet) as bar:
         done = process(Task([folder]), load(stage.config), bar)
     return done, compare(folder, stage.truth, RPE_OVER_M)
