@@ -1,4 +1,4 @@
-"""Settings of the odometry. The defaults are for a Mid-360 in a forest; `docs/odometry.md` says what each gave."""
+"""Settings of the odometry. The defaults are for a Mid-360 in a forest; `docs/odometry.md` has what they reach."""
 
 from __future__ import annotations
 
