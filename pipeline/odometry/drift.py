@@ -51,9 +51,4 @@ class Drift:
 
 def level(gravity: Doubles) -> Doubles:
     """The rotation (3, 3) that stands `odom` upright again, given gravity as the filter sees it in `odom`."""
-    up = -gravity / np.linalg.norm(gravity)
-    axis = np.cross(up, [0.0, 0.0, 1.0])
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return np.eye(3)
-    return np.asarray(so3.exp(axis / sine * math.atan2(sine, float(up[2]))))
+    return np.asarray(so3.upright(-gravity))

@@ -14,29 +14,31 @@ from numba import njit
 
 from pipeline.odometry.so3 import Doubles
 
+Floats = npt.NDArray[np.float32]
 EMPTY = -1
 SIDES = 4
-HALF = 1 << 19
-FIELD = (1 << 20) - 1
-COUNT, MEAN, SCATTER, INTENSITY, BRIGHTEST = 0, 1, 4, 10, 11
-STATISTICS = 12
-SHAPE = 13
-"""Columns of a shape: count when it was derived, three variances ascending, their directions row by row."""
+BITS = 20
+HALF = 1 << (BITS - 1)
+FIELD = (1 << BITS) - 1
+COUNT, MEAN, SEEN, BRIGHTEST, INTENSITY, SCATTER = 0, 1, 4, 5, 6, 7
+DERIVED, VARIANCES, DIRECTIONS = 13, 14, 17
+VOXEL = 32
+"""Columns of a voxel: count, mean from its low corner, scan that saw it last while it was thin, greatest and mean
+intensity, scatter xx xy xz yy yz zz; then its shape: the count it was derived from, three variances ascending, their
+directions row by row. 128 bytes: what a look-up waits for is memory, so all of it lies in two cache lines."""
+THIN = 4.0
 USED, REFUSED, CURSOR, FREE = 0, 1, 2, 3
 ROUNDS = 6
 
 
 class MapArrays(NamedTuple):
-    """slots: key and row of each place in the table. rows: statistics, shape, key, and the scan that saw it last.
+    """slots (places, 2): key and row of each place in the table. voxels (rows, VOXEL).
 
     free: stack of unused rows. numbers: rows used, voxels refused for lack of room, sweep cursor, height of the stack.
     """
 
-    keys: npt.NDArray[np.int64]
-    rows: npt.NDArray[np.int32]
-    statistics: Doubles
-    shape: npt.NDArray[np.float32]
-    seen: npt.NDArray[np.int32]
+    slots: npt.NDArray[np.int64]
+    voxels: Floats
     free: npt.NDArray[np.int32]
     numbers: npt.NDArray[np.int64]
 
@@ -67,63 +69,57 @@ def scatter_slot(key: int, mask: int) -> np.int64:
     return np.int64(h & np.uint64(mask))
 
 
-@njit(cache=True, nogil=True)
-def find(keys: npt.NDArray[np.int64], key: int) -> int:
-    """Place of a key, or -1."""
-    mask = len(keys) - 1
+@njit(cache=True, nogil=True, inline="always")
+def place(slots: npt.NDArray[np.int64], key: int) -> int:
+    """Where a key is in the table, or where it would go."""
+    mask = len(slots) - 1
     slot = scatter_slot(key, mask)
-    while keys[slot] != EMPTY:
-        if keys[slot] == key:
-            return slot
+    while slots[slot, 0] != EMPTY and slots[slot, 0] != key:
         slot = (slot + 1) & mask
-    return -1
+    return slot
 
 
 @njit(cache=True, nogil=True)
-def claim(voxels: MapArrays, key: int) -> int:
-    """Row of a key, a new one where it was not there, -1 when there is no room."""
-    mask = len(voxels.keys) - 1
-    slot = scatter_slot(key, mask)
-    while voxels.keys[slot] != EMPTY:
-        if voxels.keys[slot] == key:
-            return voxels.rows[slot]
-        slot = (slot + 1) & mask
-    if voxels.numbers[FREE] == 0:
-        voxels.numbers[REFUSED] += 1
+def _settle(grid: MapArrays, slot: int, key: int) -> int:
+    """A fresh row for a key at its empty place, -1 when there is no room."""
+    numbers = grid.numbers
+    if numbers[FREE] == 0:
+        numbers[REFUSED] += 1
         return -1
-    voxels.numbers[FREE] -= 1
-    voxels.numbers[USED] += 1
-    row = voxels.free[voxels.numbers[FREE]]
-    voxels.keys[slot] = key
-    voxels.rows[slot] = row
-    voxels.statistics[row, :] = 0.0
-    voxels.shape[row, 0] = 0.0
+    numbers[FREE] -= 1
+    numbers[USED] += 1
+    row = grid.free[numbers[FREE]]
+    grid.slots[slot, 0] = key
+    grid.slots[slot, 1] = row
+    for k in range(DIRECTIONS):
+        grid.voxels[row, k] = 0.0
     return row
 
 
 @njit(cache=True, nogil=True)
-def remove(voxels: MapArrays, slot: int) -> None:
+def remove(grid: MapArrays, slot: int) -> None:
     """Frees a place, and moves later ones back so that every probe still ends right (no tombstones)."""
-    mask = len(voxels.keys) - 1
-    voxels.free[voxels.numbers[FREE]] = voxels.rows[slot]
-    voxels.numbers[FREE] += 1
-    voxels.numbers[USED] -= 1
+    slots = grid.slots
+    mask = len(slots) - 1
+    grid.free[grid.numbers[FREE]] = slots[slot, 1]
+    grid.numbers[FREE] += 1
+    grid.numbers[USED] -= 1
     hole, probe = slot, slot
     while True:
         probe = (probe + 1) & mask
-        if voxels.keys[probe] == EMPTY:
+        if slots[probe, 0] == EMPTY:
             break
-        home = scatter_slot(voxels.keys[probe], mask)
+        home = scatter_slot(slots[probe, 0], mask)
         if ((probe - home) & mask) >= ((probe - hole) & mask):
-            voxels.keys[hole] = voxels.keys[probe]
-            voxels.rows[hole] = voxels.rows[probe]
+            slots[hole, 0] = slots[probe, 0]
+            slots[hole, 1] = slots[probe, 1]
             hole = probe
-    voxels.keys[hole] = EMPTY
+    slots[hole, 0] = EMPTY
 
 
 @njit(cache=True, nogil=True)
 def insert(
-    voxels: MapArrays,
+    grid: MapArrays,
     clusters: Doubles,
     rotation: Doubles,
     position: Doubles,
@@ -132,85 +128,103 @@ def insert(
     scan: int,
 ) -> None:
     """Merges clusters (m, 12) of `base_link` into the voxels of every level; sizes (levels,) in m. Chan's update."""
-    s = np.empty((3, 3))
-    for n in range(len(clusters)):
-        c = clusters[n]
-        mx = rotation[0, 0] * c[1] + rotation[0, 1] * c[2] + rotation[0, 2] * c[3] + position[0]
-        my = rotation[1, 0] * c[1] + rotation[1, 1] * c[2] + rotation[1, 2] * c[3] + position[1]
-        mz = rotation[2, 0] * c[1] + rotation[2, 1] * c[2] + rotation[2, 2] * c[3] + position[2]
-        turned = False
+    slots, voxels = grid.slots, grid.voxels
+    levels, count = len(sizes), len(clusters)
+    rows = np.empty((count, levels), np.int64)
+    offsets = np.empty((count, levels, 3))
+    for n in range(count):
+        x, y, z = clusters[n, 1], clusters[n, 2], clusters[n, 3]
+        mx = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + position[0]
+        my = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + position[1]
+        mz = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + position[2]
         sector = side(mx - position[0], my - position[1])
-        for level in range(len(sizes)):
-            scale = 1.0 / sizes[level]
-            row = claim(
-                voxels,
-                pack(math.floor(mx * scale), math.floor(my * scale), math.floor(mz * scale), sector + SIDES * level),
-            )
+        for level in range(levels):
+            size = sizes[level]
+            ix, iy, iz = math.floor(mx / size), math.floor(my / size), math.floor(mz / size)
+            key = pack(ix, iy, iz, sector + SIDES * level)
+            slot = place(slots, key)
+            rows[n, level] = slots[slot, 1] if slots[slot, 0] == key else _settle(grid, slot, key)
+            offsets[n, level, 0] = mx - ix * size
+            offsets[n, level, 1] = my - iy * size
+            offsets[n, level, 2] = mz - iz * size
+    s = np.zeros(6)
+    for n in range(count):
+        points = clusters[n, 0]
+        if points > 1.0:
+            _turn(clusters, n, rotation, s)
+        else:
+            s[:] = 0.0
+        for level in range(levels):
+            row = rows[n, level]
             if row < 0:
                 continue
-            v = voxels.statistics[row]
-            voxels.seen[row] = scan
-            v[BRIGHTEST] = max(v[BRIGHTEST], c[11])
-            if v[COUNT] >= most:
+            voxels[row, BRIGHTEST] = max(voxels[row, BRIGHTEST], clusters[n, 11])
+            had = voxels[row, COUNT]
+            if had >= most:
                 continue
-            if not turned:
-                _turn(c, rotation, s)
-                turned = True
-            total = v[COUNT] + c[0]
-            part = c[0] / total
-            cross = v[COUNT] * part
-            dx, dy, dz = mx - v[1], my - v[2], mz - v[3]
-            v[4] += s[0, 0] + cross * dx * dx
-            v[5] += s[0, 1] + cross * dx * dy
-            v[6] += s[0, 2] + cross * dx * dz
-            v[7] += s[1, 1] + cross * dy * dy
-            v[8] += s[1, 2] + cross * dy * dz
-            v[9] += s[2, 2] + cross * dz * dz
-            v[1] += part * dx
-            v[2] += part * dy
-            v[3] += part * dz
-            v[INTENSITY] += part * (c[10] - v[INTENSITY])
-            v[COUNT] = total
+            if had < THIN:
+                voxels[row, SEEN] = scan
+            part = points / (had + points)
+            cross = had * part
+            dx = offsets[n, level, 0] - voxels[row, MEAN]
+            dy = offsets[n, level, 1] - voxels[row, MEAN + 1]
+            dz = offsets[n, level, 2] - voxels[row, MEAN + 2]
+            voxels[row, SCATTER] += s[0] + cross * dx * dx
+            voxels[row, SCATTER + 1] += s[1] + cross * dx * dy
+            voxels[row, SCATTER + 2] += s[2] + cross * dx * dz
+            voxels[row, SCATTER + 3] += s[3] + cross * dy * dy
+            voxels[row, SCATTER + 4] += s[4] + cross * dy * dz
+            voxels[row, SCATTER + 5] += s[5] + cross * dz * dz
+            voxels[row, MEAN] += part * dx
+            voxels[row, MEAN + 1] += part * dy
+            voxels[row, MEAN + 2] += part * dz
+            voxels[row, INTENSITY] += part * (clusters[n, 10] - voxels[row, INTENSITY])
+            voxels[row, COUNT] = had + points
 
 
-@njit(cache=True, nogil=True)
-def _turn(c: Doubles, r: Doubles, s: Doubles) -> None:
-    """s = R S R^T of the scatter of a cluster."""
+@njit(cache=True, nogil=True, inline="always")
+def _turn(c: Doubles, n: int, r: Doubles, s: Doubles) -> None:
+    """s = R S R^T of the scatter of a cluster, both as xx xy xz yy yz zz."""
+    k = 0
     for i in range(3):
-        ax = r[i, 0] * c[4] + r[i, 1] * c[5] + r[i, 2] * c[6]
-        ay = r[i, 0] * c[5] + r[i, 1] * c[7] + r[i, 2] * c[8]
-        az = r[i, 0] * c[6] + r[i, 1] * c[8] + r[i, 2] * c[9]
-        for j in range(3):
-            s[i, j] = ax * r[j, 0] + ay * r[j, 1] + az * r[j, 2]
+        ax = r[i, 0] * c[n, 4] + r[i, 1] * c[n, 5] + r[i, 2] * c[n, 6]
+        ay = r[i, 0] * c[n, 5] + r[i, 1] * c[n, 7] + r[i, 2] * c[n, 8]
+        az = r[i, 0] * c[n, 6] + r[i, 1] * c[n, 8] + r[i, 2] * c[n, 9]
+        for j in range(i, 3):
+            s[k] = ax * r[j, 0] + ay * r[j, 1] + az * r[j, 2]
+            k += 1
 
 
 @njit(cache=True, nogil=True)
-def sweep(voxels: MapArrays, centre: Doubles, reach_m: float, scan: int, stale: int, places: int) -> None:
+def sweep(grid: MapArrays, centre: Doubles, sizes: Doubles, reach_m: float, scan: int, stale: int, places: int) -> None:
     """Looks at the next `places` of the table; forgets what is out of reach, and thin voxels not seen for `stale`."""
-    mask = len(voxels.keys) - 1
-    slot = voxels.numbers[CURSOR]
+    mask = len(grid.slots) - 1
+    slot = grid.numbers[CURSOR]
     left = places
     while left > 0:
         left -= 1
-        if voxels.keys[slot] != EMPTY:
-            row = voxels.rows[slot]
-            v = voxels.statistics[row]
-            dx, dy, dz = v[1] - centre[0], v[2] - centre[1], v[3] - centre[2]
+        key = grid.slots[slot, 0]
+        if key != EMPTY:
+            v = grid.voxels[grid.slots[slot, 1]]
+            size = sizes[(key >> (3 * BITS)) // SIDES]
+            dx = (((key >> (2 * BITS)) & FIELD) - HALF) * size - centre[0]
+            dy = (((key >> BITS) & FIELD) - HALF) * size - centre[1]
+            dz = ((key & FIELD) - HALF) * size - centre[2]
             far = dx * dx + dy * dy + dz * dz > reach_m * reach_m
-            if far or (v[COUNT] < 4.0 and scan - voxels.seen[row] > stale):
-                remove(voxels, slot)
+            if far or (v[COUNT] < THIN and scan - v[SEEN] > stale):
+                remove(grid, slot)
                 continue  # another voxel may have moved here
         slot = (slot + 1) & mask
-    voxels.numbers[CURSOR] = slot
+    grid.numbers[CURSOR] = slot
 
 
 @njit(cache=True, nogil=True)
-def derive(shape: npt.NDArray[np.float32], v: Doubles, prior: float, extra: float) -> None:
+def derive(v: Floats, prior: float, extra: float) -> None:
     """Variances and directions of a voxel's scatter by Jacobi rotations, shrunk to `prior` (m^2) by `extra` points."""
     a, q = np.empty((3, 3)), np.eye(3)
     scale = 1.0 / v[COUNT]
-    a[0, 0], a[0, 1], a[0, 2] = v[4] * scale, v[5] * scale, v[6] * scale
-    a[1, 1], a[1, 2], a[2, 2] = v[7] * scale, v[8] * scale, v[9] * scale
+    a[0, 0], a[0, 1], a[0, 2] = v[SCATTER] * scale, v[SCATTER + 1] * scale, v[SCATTER + 2] * scale
+    a[1, 1], a[1, 2], a[2, 2] = v[SCATTER + 3] * scale, v[SCATTER + 4] * scale, v[SCATTER + 5] * scale
     for _ in range(ROUNDS):
         if abs(a[0, 1]) + abs(a[0, 2]) + abs(a[1, 2]) < 1e-9:
             break
@@ -224,12 +238,12 @@ def derive(shape: npt.NDArray[np.float32], v: Doubles, prior: float, extra: floa
         second, third = third, second
         if a[second, second] < a[first, first]:
             first, second = second, first
-    shape[0] = v[COUNT]
+    v[DERIVED] = v[COUNT]
     weight = v[COUNT] / (v[COUNT] + extra)
     for k, column in enumerate((first, second, third)):
-        shape[1 + k] = weight * max(a[column, column], 0.0) + (1.0 - weight) * prior
+        v[VARIANCES + k] = weight * max(a[column, column], 0.0) + (1.0 - weight) * prior
         for i in range(3):
-            shape[4 + 3 * k + i] = q[i, column]
+            v[DIRECTIONS + 3 * k + i] = q[i, column]
 
 
 @njit(cache=True, nogil=True, inline="always")

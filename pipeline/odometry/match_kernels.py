@@ -11,13 +11,26 @@ import math
 import numpy as np
 from numba import njit
 
-from pipeline.odometry.map_kernels import COUNT, SIDES, MapArrays, derive, find, pack, side
+from pipeline.odometry.map_kernels import (
+    COUNT,
+    DERIVED,
+    DIRECTIONS,
+    EMPTY,
+    MEAN,
+    SIDES,
+    VARIANCES,
+    MapArrays,
+    derive,
+    pack,
+    place,
+    side,
+)
 from pipeline.odometry.so3 import Doubles
 
 
 @njit(cache=True, nogil=True)
 def match(
-    voxels: MapArrays,
+    grid: MapArrays,
     clusters: Doubles,
     rotation: Doubles,
     position: Doubles,
@@ -31,40 +44,38 @@ def match(
     settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas), widest direction and prior variance
     as shares of the squared size, weight of the prior in points.
     """
-    a, b, numbers = np.zeros((6, 6)), np.zeros(6), np.zeros(4)
+    a, b, numbers, h = np.zeros((6, 6)), np.zeros(6), np.zeros(4), np.empty(6)
     fewest, floor, huber, gate = settings[0], settings[1] ** 2, settings[2], settings[3] ** 2
-    h = np.empty(6)
+    slots, voxels = grid.slots, grid.voxels
     for n in range(len(clusters)):
-        c = clusters[n]
-        qx, qy, qz = c[1], c[2], c[3]
+        qx, qy, qz = clusters[n, 1], clusters[n, 2], clusters[n, 3]
         wx = rotation[0, 0] * qx + rotation[0, 1] * qy + rotation[0, 2] * qz + position[0]
         wy = rotation[1, 0] * qx + rotation[1, 1] * qy + rotation[1, 2] * qz + position[1]
         wz = rotation[2, 0] * qx + rotation[2, 1] * qy + rotation[2, 2] * qz + position[2]
-        row, size = -1, 0.0
+        row, size, rx, ry, rz = np.int64(-1), 0.0, 0.0, 0.0, 0.0
         sector = side(wx - position[0], wy - position[1])
         for level in range(first_level, len(sizes)):
             size = sizes[level]
-            scale = 1.0 / size
-            slot = find(
-                voxels.keys,
-                pack(math.floor(wx * scale), math.floor(wy * scale), math.floor(wz * scale), sector + SIDES * level),
-            )
-            if slot >= 0 and voxels.statistics[voxels.rows[slot], COUNT] >= fewest:
-                row = voxels.rows[slot]
+            ix, iy, iz = math.floor(wx / size), math.floor(wy / size), math.floor(wz / size)
+            slot = place(slots, pack(ix, iy, iz, sector + SIDES * level))
+            if slots[slot, 0] != EMPTY and voxels[slots[slot, 1], COUNT] >= fewest:
+                row = slots[slot, 1]
+                rx = wx - ix * size - voxels[row, MEAN]
+                ry = wy - iy * size - voxels[row, MEAN + 1]
+                rz = wz - iz * size - voxels[row, MEAN + 2]
                 break
         if row < 0:
             continue
-        v, shape = voxels.statistics[row], voxels.shape[row]
-        if v[COUNT] > 1.2 * shape[0]:
-            derive(shape, v, settings[5] * size * size, settings[6])
-        rx, ry, rz = wx - v[1], wy - v[2], wz - v[3]
-        share = 1.0 / c[0] + 1.0 / v[COUNT]
+        if voxels[row, COUNT] > 1.5 * voxels[row, DERIVED]:
+            derive(voxels[row], settings[5] * size * size, settings[6])
+        share = 1.0 / clusters[n, 0] + 1.0 / voxels[row, COUNT]
         widest = settings[4] * size * size
         distance = 0.0
         for k in range(3):
-            variance = shape[1 + k]
+            variance = voxels[row, VARIANCES + k]
             if variance < widest:
-                r = rx * shape[4 + 3 * k] + ry * shape[5 + 3 * k] + rz * shape[6 + 3 * k]
+                u = DIRECTIONS + 3 * k
+                r = rx * voxels[row, u] + ry * voxels[row, u + 1] + rz * voxels[row, u + 2]
                 distance += r * r / (variance * share + floor)
         if distance > gate:
             continue
@@ -73,10 +84,11 @@ def match(
         numbers[1] += distance
         numbers[2] += robust
         for k in range(3):
-            variance = shape[1 + k]
+            variance = voxels[row, VARIANCES + k]
             if variance >= widest:
                 break
-            ux, uy, uz = float(shape[4 + 3 * k]), float(shape[5 + 3 * k]), float(shape[6 + 3 * k])
+            u = DIRECTIONS + 3 * k
+            ux, uy, uz = float(voxels[row, u]), float(voxels[row, u + 1]), float(voxels[row, u + 2])
             weight = robust * (1.0 - variance / widest) / (variance * share + floor)
             r = rx * ux + ry * uy + rz * uz
             # h = (q x R^T u, u): derivative of u . (R Exp(th) q + p).

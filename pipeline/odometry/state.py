@@ -43,7 +43,7 @@ class State:
     def minus(self, other: State) -> Doubles:
         """The error (17,) that moves `other` here."""
         axes = gravity_axes(other.gravity_m_s2)
-        turn = np.cross(other.gravity_m_s2, self.gravity_m_s2) / (other.gravity_m_s2 @ other.gravity_m_s2)
+        turn = so3.cross(other.gravity_m_s2, self.gravity_m_s2) / (other.gravity_m_s2 @ other.gravity_m_s2)
         return np.concatenate(
             [
                 so3.log(other.rotation.T @ self.rotation),
@@ -91,14 +91,4 @@ class State:
 
 def gravity_axes(gravity: Doubles) -> Doubles:
     """Two axes (3, 2) across gravity, smooth around straight down. Gravity never leaves that half: `odom` is level."""
-    down = gravity / np.sqrt(gravity @ gravity)
-    first = np.array([1.0 - down[0] * down[0], -down[0] * down[1], -down[0] * down[2]])
-    first /= np.sqrt(first @ first)
-    second = np.array(
-        [
-            down[1] * first[2] - down[2] * first[1],
-            down[2] * first[0] - down[0] * first[2],
-            down[0] * first[1] - down[1] * first[0],
-        ]
-    )
-    return np.column_stack([first, second])
+    return np.asarray(so3.across(gravity))

@@ -9,7 +9,7 @@ from pipeline.odometry.config import MapConfig
 from pipeline.odometry.so3 import Doubles
 
 STALE_SCANS = 100
-SWEEPS = 64
+SWEEPS = 128
 """The whole table is looked through once in so many scans."""
 TIGHT = 0.85
 LEAST_REACH_M = 15.0
@@ -23,25 +23,25 @@ class VoxelMap:
         self._sizes = np.array([config.fine_m, config.coarse_m])
         self._scan = 0
         self._reach_m = config.reach_m
-        self._voxels = _empty(config.voxels_most)
+        self._grid = _empty(config.voxels_most)
 
     def __len__(self) -> int:
-        return int(self._voxels.numbers[kernels.USED])
+        return int(self._grid.numbers[kernels.USED])
 
     @property
     def refused(self) -> int:
         """Voxels that found no room. The reach shrinks long before."""
-        return int(self._voxels.numbers[kernels.REFUSED])
+        return int(self._grid.numbers[kernels.REFUSED])
 
     @property
     def nbytes(self) -> int:
         """All memory of the map; fixed at construction."""
-        return sum(array.nbytes for array in self._voxels)
+        return sum(array.nbytes for array in self._grid)
 
     @property
     def arrays(self) -> kernels.MapArrays:
         """For the matching kernels."""
-        return self._voxels
+        return self._grid
 
     @property
     def sizes(self) -> Doubles:
@@ -51,22 +51,19 @@ class VoxelMap:
     def insert(self, clusters: Doubles, rotation: Doubles, position: Doubles) -> None:
         """Take in the clusters of a scan, seen from a pose, and forget a little of what is far."""
         self._scan += 1
-        kernels.insert(self._voxels, clusters, rotation, position, self._sizes, self._config.frozen_points, self._scan)
+        kernels.insert(self._grid, clusters, rotation, position, self._sizes, self._config.frozen_points, self._scan)
         full = len(self) / self._config.voxels_most
         grow = 0.98 if full > TIGHT else 1.01
         self._reach_m = min(max(self._reach_m * grow, LEAST_REACH_M), self._config.reach_m)
-        places = len(self._voxels.keys) // SWEEPS
-        kernels.sweep(self._voxels, position, self._reach_m, self._scan, STALE_SCANS, places)
+        places = len(self._grid.slots) // SWEEPS
+        kernels.sweep(self._grid, position, self._sizes, self._reach_m, self._scan, STALE_SCANS, places)
 
 
 def _empty(most: int) -> kernels.MapArrays:
     places = 1 << (2 * most - 1).bit_length()
     return kernels.MapArrays(
-        keys=np.full(places, kernels.EMPTY, np.int64),
-        rows=np.zeros(places, np.int32),
-        statistics=np.zeros((most, kernels.STATISTICS)),
-        shape=np.zeros((most, kernels.SHAPE), np.float32),
-        seen=np.zeros(most, np.int32),
+        slots=np.full((places, 2), kernels.EMPTY, np.int64),
+        voxels=np.zeros((most, kernels.VOXEL), np.float32),
         free=np.arange(most, dtype=np.int32)[::-1].copy(),
         numbers=np.array([0, 0, 0, most], np.int64),
     )

@@ -102,7 +102,7 @@ def test_crc_has_the_value_of_the_catalogue():
 
 
 @given(cuts=st.lists(st.integers(0, 40_000), max_size=40), head=st.binary(max_size=400))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_how_the_bytes_are_cut_makes_no_difference(cuts, head):
     data = head + muxed(tiny_units()[:12])
     whole, _ = demuxed(data)
@@ -112,13 +112,13 @@ def test_how_the_bytes_are_cut_makes_no_difference(cuts, head):
 
 
 @given(st.lists(st.binary(max_size=600), max_size=20))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_nothing_makes_it_raise(chunks):
     demuxed(b"".join(chunks), range(0, sum(map(len, chunks)), 97))
 
 
 @given(seed=st.integers(0, 1 << 30))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_damage_never_raises_and_never_makes_up_an_access_unit(seed):
     chance = random.Random(seed)
     data = muxed(tiny_units()[:30])
@@ -138,7 +138,7 @@ def test_damage_never_raises_and_never_makes_up_an_access_unit(seed):
 
 
 @given(seed=st.integers(0, 1 << 30))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_flipped_bits_never_raise(seed):
     chance = random.Random(seed)
     data = bytearray(muxed(tiny_units()[:10]))
@@ -190,7 +190,7 @@ def through_order(pieces):
 @given(
     swaps=st.sets(st.integers(2, 40)), copies=st.sets(st.integers(0, 40)), rubbish=st.binary(min_size=1, max_size=900)
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_swapped_neighbours_copies_and_rubbish_cost_nothing(swaps, copies, rubbish):
     pieces = datagrams(muxed(tiny_units()))
     for at in sorted(swaps):

@@ -44,7 +44,7 @@ def wounded(data, wounds):
     return bytes(hurt)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, derandomize=True)
 @given(base=st.integers(0, len(BASES) - 1), wounds=WOUNDS)
 def test_any_damage_ends_in_a_sound_copy_or_a_clear_refusal(tmp_path_factory, base, wounds):
     folder = tmp_path_factory.mktemp("hurt")

@@ -206,7 +206,7 @@ def test_a_recorder_that_goes_away_is_told(client: ControlClient, server: Contro
         next(states)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(garbage=st.binary(max_size=400) | st.text(max_size=100).map(lambda text: json.dumps({"type": text}).encode()))
 def test_garbage_is_refused_and_disturbs_nobody(client: ControlClient, path: Path, garbage: bytes) -> None:
     with raw(path) as rude, contextlib.suppress(ConnectionError):
