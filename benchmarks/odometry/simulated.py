@@ -42,20 +42,20 @@ class Walk:
 
     def scans(self) -> Iterator[LidarScan]:
         """The sweeps in order."""
-        points = np.memmap(self.folder / "points.raw", POINT, "r")
-        ends = np.load(self.folder / "ends.npy")
-        for k, (first, last) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
-            part = points[first:last]
-            stamp = EPOCH_NS + k * SCAN_NS
-            yield LidarScan(
-                stamp,
-                stamp + SCAN_NS,
-                np.ascontiguousarray(part["xyz_mm"] * np.float32(1e-3)),
-                np.ascontiguousarray(part["reflectivity"]),
-                np.ascontiguousarray(part["tag"]),
-                (part["slot"] % 4).astype(np.uint8),
-                part["slot"].astype(np.uint32) * np.uint32(SLOT_NS),
-            )
+        counts = np.diff(np.load(self.folder / "ends.npy"), prepend=0)
+        with (self.folder / "points.raw").open("rb") as file:
+            for k, count in enumerate(counts.tolist()):
+                part = np.fromfile(file, POINT, count)
+                stamp = EPOCH_NS + k * SCAN_NS
+                yield LidarScan(
+                    stamp,
+                    stamp + SCAN_NS,
+                    np.ascontiguousarray(part["xyz_mm"] * np.float32(1e-3)),
+                    np.ascontiguousarray(part["reflectivity"]),
+                    np.ascontiguousarray(part["tag"]),
+                    (part["slot"] % 4).astype(np.uint8),
+                    part["slot"].astype(np.uint32) * np.uint32(SLOT_NS),
+                )
 
     def imu(self) -> list[ImuSample]:
         """The inertial samples in order, in SI units."""

@@ -27,11 +27,14 @@ class ImuConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MapConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The voxel map: two grids, fine for stems, coarse for what is far and for recovery."""
+    """The voxel map: a fine grid for stems, a coarse one for what is far and for recovery."""
 
-    fine_m: float = 0.3
-    coarse_m: float = 1.2
-    voxels_most: int = 400_000
+    sizes_m: tuple[float, ...] = (0.3, 1.2)
+    """Of the voxels of each grid, fine to coarse."""
+    sides: int = 4
+    """4: what is seen from another side is another voxel (`map_kernels.side`); 1: one voxel from all sides."""
+    voxels_most: int = 700_000
+    """90 MB, and 34 MB of hash table. A full map shortens its reach: from a bicycle the way then drifts more."""
     frozen_points: int = 100
     """A voxel takes in this many points, then keeps its shape: the map does not follow the drift."""
     reach_m: float = 70.0
@@ -54,6 +57,8 @@ class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     prior: float = 0.0278
     """Variance, likewise, that a voxel of few points is taken to have, with the weight of `prior_points`."""
     prior_points: float = 3.0
+    directions: int = 3
+    """So many of a voxel's directions are used, the thinnest first; 1: point to plane."""
     effective: float = 300.0
     """So many residuals a scan count as independent."""
     least_share: float = 0.15

@@ -124,10 +124,14 @@ def insert(
     rotation: Doubles,
     position: Doubles,
     sizes: Doubles,
+    sides: int,
     most: float,
     scan: int,
 ) -> None:
-    """Merges clusters (m, 12) of `base_link` into the voxels of every level; sizes (levels,) in m. Chan's update."""
+    """Merges clusters (m, 12) of `base_link` into the voxels of every level, with Chan's update.
+
+    sizes: (levels,) m. sides: 4, or 1 for none. most: points from which on a voxel keeps its shape.
+    """
     slots, voxels = grid.slots, grid.voxels
     levels, count = len(sizes), len(clusters)
     rows = np.empty((count, levels), np.int64)
@@ -137,7 +141,7 @@ def insert(
         mx = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + position[0]
         my = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + position[1]
         mz = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + position[2]
-        sector = side(mx - position[0], my - position[1])
+        sector = side(mx - position[0], my - position[1]) if sides > 1 else 0
         for level in range(levels):
             size = sizes[level]
             ix, iy, iz = math.floor(mx / size), math.floor(my / size), math.floor(mz / size)

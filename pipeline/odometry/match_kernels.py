@@ -35,6 +35,7 @@ def match(
     rotation: Doubles,
     position: Doubles,
     sizes: Doubles,
+    sides: int,
     first_level: int,
     settings: Doubles,
 ) -> tuple[Doubles, Doubles, Doubles]:
@@ -42,18 +43,18 @@ def match(
 
     The update is -A^-1 b. Levels before `first_level` are left out.
     settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas), widest direction and prior variance
-    as shares of the squared size, weight of the prior in points.
+    as shares of the squared size, weight of the prior in points, most directions.
     """
     a, b, numbers, h = np.zeros((6, 6)), np.zeros(6), np.zeros(4), np.empty(6)
     fewest, floor, huber, gate = settings[0], settings[1] ** 2, settings[2], settings[3] ** 2
-    slots, voxels = grid.slots, grid.voxels
+    slots, voxels, directions = grid.slots, grid.voxels, int(settings[7])
     for n in range(len(clusters)):
         qx, qy, qz = clusters[n, 1], clusters[n, 2], clusters[n, 3]
         wx = rotation[0, 0] * qx + rotation[0, 1] * qy + rotation[0, 2] * qz + position[0]
         wy = rotation[1, 0] * qx + rotation[1, 1] * qy + rotation[1, 2] * qz + position[1]
         wz = rotation[2, 0] * qx + rotation[2, 1] * qy + rotation[2, 2] * qz + position[2]
         row, size, rx, ry, rz = np.int64(-1), 0.0, 0.0, 0.0, 0.0
-        sector = side(wx - position[0], wy - position[1])
+        sector = side(wx - position[0], wy - position[1]) if sides > 1 else 0
         for level in range(first_level, len(sizes)):
             size = sizes[level]
             ix, iy, iz = math.floor(wx / size), math.floor(wy / size), math.floor(wz / size)
@@ -66,12 +67,12 @@ def match(
                 break
         if row < 0:
             continue
-        if voxels[row, COUNT] > 1.5 * voxels[row, DERIVED]:
+        if voxels[row, COUNT] > 1.2 * voxels[row, DERIVED]:
             derive(voxels[row], settings[5] * size * size, settings[6])
         share = 1.0 / clusters[n, 0] + 1.0 / voxels[row, COUNT]
         widest = settings[4] * size * size
         distance = 0.0
-        for k in range(3):
+        for k in range(directions):
             variance = voxels[row, VARIANCES + k]
             if variance < widest:
                 u = DIRECTIONS + 3 * k
@@ -83,7 +84,7 @@ def match(
         numbers[0] += 1.0
         numbers[1] += distance
         numbers[2] += robust
-        for k in range(3):
+        for k in range(directions):
             variance = voxels[row, VARIANCES + k]
             if variance >= widest:
                 break

@@ -43,7 +43,16 @@ class Tracker:
         self._scan = 0
         one = config.match
         self._settings = np.array(
-            [one.fewest_points, one.floor_m, one.huber, one.gate, one.wide, one.prior, one.prior_points]
+            [
+                one.fewest_points,
+                one.floor_m,
+                one.huber,
+                one.gate,
+                one.wide,
+                one.prior,
+                one.prior_points,
+                one.directions,
+            ]
         )
 
     def track(self, scan: LidarScan, imu: Doubles) -> Registration:
@@ -108,7 +117,14 @@ class Tracker:
     def _match(self, clusters: Doubles, guess: State, *, coarse_only: bool) -> NormalEquations:
         first = len(self.map.sizes) - 1 if coarse_only else 0
         a, b, numbers = match(
-            self.map.arrays, clusters, guess.rotation, guess.position_m, self.map.sizes, first, self._settings
+            self.map.arrays,
+            clusters,
+            guess.rotation,
+            guess.position_m,
+            self.map.sizes,
+            self._config.map.sides,
+            first,
+            self._settings,
         )
         count = max(float(numbers[0]), 1.0)
         # Thousands of residuals share the same few errors (section 5.4 of FAST-LIO2's practice): count them as fewer.

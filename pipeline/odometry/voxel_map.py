@@ -9,7 +9,7 @@ from pipeline.odometry.config import MapConfig
 from pipeline.odometry.so3 import Doubles
 
 STALE_SCANS = 100
-SWEEPS = 128
+SWEEPS = 64
 """The whole table is looked through once in so many scans."""
 TIGHT = 0.85
 LEAST_REACH_M = 15.0
@@ -20,7 +20,7 @@ class VoxelMap:
 
     def __init__(self, config: MapConfig) -> None:
         self._config = config
-        self._sizes = np.array([config.fine_m, config.coarse_m])
+        self._sizes = np.array(config.sizes_m)
         self._scan = 0
         self._reach_m = config.reach_m
         self._grid = _empty(config.voxels_most)
@@ -51,7 +51,16 @@ class VoxelMap:
     def insert(self, clusters: Doubles, rotation: Doubles, position: Doubles) -> None:
         """Take in the clusters of a scan, seen from a pose, and forget a little of what is far."""
         self._scan += 1
-        kernels.insert(self._grid, clusters, rotation, position, self._sizes, self._config.frozen_points, self._scan)
+        kernels.insert(
+            self._grid,
+            clusters,
+            rotation,
+            position,
+            self._sizes,
+            self._config.sides,
+            self._config.frozen_points,
+            self._scan,
+        )
         full = len(self) / self._config.voxels_most
         grow = 0.98 if full > TIGHT else 1.01
         self._reach_m = min(max(self._reach_m * grow, LEAST_REACH_M), self._config.reach_m)
