@@ -33,7 +33,7 @@ example: mapforest demo --seed 3
          mapforest demo --tui      (press the keys yourself: space starts, space twice stops, q leaves)
 
 Three emulated sensors speak their real protocols from one simulated forest; a recorder records them as on the
-payload. The outputs stay in the folder demo/."""
+payload, and the live pipeline finds the way beside it. The outputs stay in the folder demo/."""
 RPE_OVER_M = 10.0
 """The walk of the demonstration is 43 m long."""
 _EXIT = {"PASS": exit_codes.GOOD, "WARN": exit_codes.WARNINGS, "FAIL": exit_codes.FAILED}
@@ -54,8 +54,15 @@ def run(args: argparse.Namespace) -> int:
     stage = demo.Stage(args.folder.absolute())
     config = demo.payload_config(stage, scenario(args.scenario, args.seed))
     demo.prepare(stage, config)
-    console.print("starting the emulated payload (the first time on a machine compiles it: about a minute) ...")
-    with demo.recorder(stage) as client, Payload(config) as payload:
+    console.print(
+        "starting the emulated payload and the live pipeline (the first time on a machine they are compiled: about a "
+        "minute) ..."
+    )
+    with (
+        demo.recorder(stage) as client,
+        demo.pipeline(stage) as live,
+        Payload(config, lambda: _wait(stage, live, client, console)) as payload,
+    ):
         if args.tui:
             _operate(stage)
             return exit_codes.GOOD
@@ -72,6 +79,11 @@ def run(args: argparse.Namespace) -> int:
         for name, meaning in done.facts.files.items():
             console.print(f"            {name}  {meaning}", highlight=False)
     return _EXIT[verdict.verdict]
+
+
+def _wait(stage: demo.Stage, live: demo.Process, client: ControlClient, console: Console) -> None:
+    console.print("the sensors are ready; waiting for the live pipeline, so that it sees the walk from the start ...")
+    demo.wait_for_pipeline(stage, live, client)
 
 
 def _mission(client: ControlClient, payload: Payload, console: Console) -> tuple[Path, Verdict]:
