@@ -18,12 +18,13 @@ from drivers.sim.scenarios import scenario
 from edge import demo
 from edge.cli import exit_codes
 from edge.cli.ending import end_with_the_terminal
-from edge.cli.evaluate import clock_table, trajectory_table
+from edge.cli.evaluate import clock_table
 from edge.cli.stage_bar import StageBar
+from edge.cli.trajectories import show
 from edge.config import load
 from edge.control.client import ControlClient
 from edge.control.messages import Status, Verdict
-from edge.process.against_truth import Compared, compare
+from edge.process.against_truth import Compared, compare, find_pairs
 from edge.process.process import Done, Task, process
 from edge.validation.clock_truth import ClockReport, clock_reports
 
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         told = {"session": str(folder), "verdict": verdict, "clocks": reports, "trajectory": poses}
         print(msgspec.json.encode(told).decode())
     else:
-        console.print(trajectory_table(poses))
+        show(console, poses)
         _conclude(console, folder, verdict, reports)
         console.print(f"products    {done.folder}", highlight=False)
         for name, meaning in done.facts.files.items():
@@ -98,7 +99,7 @@ def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list
     logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     with StageBar(quiet=quiet) as bar:
         done = process(Task([folder]), load(stage.config), bar)
-    return done, compare(folder, stage.truth, RPE_OVER_M)
+    return done, compare(find_pairs(folder, stage.truth), RPE_OVER_M)
 
 
 def _operate(stage: demo.Stage) -> None:
