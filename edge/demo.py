@@ -54,6 +54,11 @@ class Stage:
         """What is true of the simulated walk."""
         return self.folder / "truth"
 
+    @property
+    def plots(self) -> Path:
+        """The errors of the trajectories, as a page."""
+        return self.folder / "evaluation.html"
+
     def log(self, service: str) -> Path:
         """What the recorder or the pipeline says."""
         return self.folder / f"{service}.log"

@@ -24,9 +24,11 @@ from edge.cli.trajectories import show
 from edge.config import load
 from edge.control.client import ControlClient
 from edge.control.messages import Status, Verdict
-from edge.process.against_truth import Compared, compare, find_pairs
+from edge.process.against_truth import find_pairs
 from edge.process.process import Done, Task, process
 from edge.validation.clock_truth import ClockReport, clock_reports
+from pipeline.evaluation.pair import Compared, compare
+from pipeline.products.comparison import write_comparison
 
 HELP = """the whole mission on the emulated payload: record a walk, validate it, locate it, compare with the truth
 
@@ -79,6 +81,7 @@ def run(args: argparse.Namespace) -> int:
         console.print(f"products    {done.folder}", highlight=False)
         for name, meaning in done.facts.files.items():
             console.print(f"            {name}  {meaning}", highlight=False)
+        console.print(f"evaluation  {stage.plots}  (plots of the errors above)", highlight=False)
     return _EXIT[verdict.verdict]
 
 
@@ -99,7 +102,9 @@ def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list
     logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     with StageBar(quiet=quiet) as bar:
         done = process(Task([folder]), load(stage.config), bar)
-    return done, compare(find_pairs(folder, stage.truth), RPE_OVER_M)
+    pairs = find_pairs(folder, stage.truth)
+    write_comparison(stage.plots, f"Trajectories of {folder.name}", pairs)
+    return done, compare(pairs, RPE_OVER_M)
 
 
 def _operate(stage: demo.Stage) -> None:

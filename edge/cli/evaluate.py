@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 from rich.console import Console
@@ -12,12 +13,17 @@ from rich.table import Table
 from edge.cli import exit_codes
 from edge.cli.words import console
 from edge.config import load
+from edge.errors import EdgeError, UsageError
 from edge.validation.clock_truth import ClockReport, clock_reports
+
+if TYPE_CHECKING:  # heavy: scipy
+    from pipeline.evaluation.pair import Pair
 
 HELP = """compare estimates with ground truth
 
 example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth
+         mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth --page plots.html
          mapforest evaluate trajectory estimate.tum --truth truth.tum --over 50
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
@@ -38,12 +44,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--settle", type=float, default=10.0, metavar="S", help="clocks: leave out this much of an epoch"
     )
     parser.add_argument("--over", type=float, default=100.0, metavar="M", help="trajectory: stretches of the RPE")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="trajectory: also write plots, as one HTML page")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     if args.what == "trajectory":
         return _trajectory(args)
+    if args.page is not None:
+        raise UsageError("--page: there are plots of trajectories only; `mapforest evaluate trajectory`")
     reports = clock_reports(args.session, args.truth, args.settle)
     if args.json:
         print(msgspec.json.encode(reports).decode())
@@ -54,15 +63,27 @@ def run(args: argparse.Namespace) -> int:
 
 def _trajectory(args: argparse.Namespace) -> int:
     from edge.cli.trajectories import show
-    from edge.process.against_truth import compare, find_pairs
+    from edge.process.against_truth import find_pairs
+    from pipeline.evaluation.pair import compare
 
     pairs = find_pairs(args.session, args.truth, load(args.config))
     found = compare(pairs, args.over)
+    if args.page is not None:
+        _write_page(args.page, args.session, pairs)
     if args.json:
         print(msgspec.json.encode(found).decode())
     else:
         show(console(), found)
     return exit_codes.GOOD
+
+
+def _write_page(path: Path, session: Path, pairs: list[Pair]) -> None:
+    from pipeline.products.comparison import write_comparison
+
+    try:
+        write_comparison(path, f"Trajectories of {session.absolute().name}", pairs)
+    except OSError as error:
+        raise EdgeError(f"{path}: cannot be written ({error.strerror}); give another place with --page") from error
 
 
 def clock_table(reports: list[ClockReport]) -> Table:

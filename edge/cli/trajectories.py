@@ -7,7 +7,8 @@ from math import isfinite
 from rich.console import Console
 from rich.table import Table
 
-from edge.process.against_truth import APART, Compared
+from edge.process.against_truth import APART
+from pipeline.evaluation.pair import Compared
 
 HONEST_SHARE = 0.95
 """Of the differences, within the 95 % ellipsoid of both covariances together."""

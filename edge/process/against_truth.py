@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,48 +14,15 @@ from edge.config import Config
 from edge.errors import FormatError
 from edge.process.products_stage import ProductFacts
 from edge.replay.poses import LivePoses, read_live_poses
-from pipeline.evaluation.trajectory import (
-    Alignment,
-    Trajectory,
-    TrajectoryErrors,
-    read_tum,
-    together,
-    trajectory_errors,
-)
+from pipeline.evaluation.pair import ALIGNMENTS, Pair
+from pipeline.evaluation.trajectory import Alignment, Trajectory, read_tum, together
 from pipeline.gnss.geodesy import Datum
 from pipeline.products.covariance import read_covariance
 
-ALIGNMENTS: tuple[Alignment, ...] = ("none", "yaw", "se3")
-IN_ODOM = ALIGNMENTS[1:]
+IN_ODOM: tuple[Alignment, ...] = ("yaw", "se3")
 """`odom` begins anywhere: as it is, it says nothing."""
 APART = "live - offline"
-"""The name of the pair whose estimate is the live `map` and whose truth is the offline one."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pair:
-    """A trajectory and what it is measured against: in one clock, and in one frame but for the alignments."""
-
-    name: str
-    estimate: Trajectory
-    true: Trajectory
-    alignments: tuple[Alignment, ...] = ALIGNMENTS
-
-
-class Compared(msgspec.Struct, frozen=True):
-    """One trajectory against the truth."""
-
-    trajectory: str
-    errors: TrajectoryErrors
-
-
-def compare(pairs: Sequence[Pair], over_m: float = 100.0) -> list[Compared]:
-    """Every trajectory in each of its alignments."""
-    return [
-        Compared(pair.name, trajectory_errors(pair.estimate, pair.true, kind, rpe_over_m=over_m))
-        for pair in pairs
-        for kind in pair.alignments
-    ]
+"""The name of the pair that sets the live `map` against the offline one."""
 
 
 def find_pairs(target: Path, truth: Path, config: Config | None = None) -> list[Pair]:
@@ -91,7 +58,7 @@ def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
     if live.odom is not None and live.odom.overlaps(true):
         yield _pair("live odom", live.odom, true, IN_ODOM)
     if in_map is not None and offline is not None and in_map.overlaps(offline):
-        yield Pair(APART, *together(in_map, offline), ("none",))
+        yield Pair(APART, *together(in_map, offline), ("none",), against="offline trajectory")
 
 
 def _pair(name: str, estimate: Trajectory, true: Trajectory, alignments: tuple[Alignment, ...] = ALIGNMENTS) -> Pair:
@@ -113,8 +80,8 @@ def _in_map(earth: Trajectory, datum: Datum) -> Trajectory:
 
 
 def _plain_truth(path: Path) -> Trajectory:
-    if path.is_dir():
-        raise FormatError(f"{path}: with a plain trajectory the truth is a TUM file, such as {path / 'poses.tum'}")
+    if not path.is_file():
+        raise FormatError(f"{path}: with a plain trajectory the truth is a TUM file, such as poses.tum of a simulation")
     return read_tum(path)
 
 

@@ -137,12 +137,12 @@ def trajectory_errors(
         alignment=alignment,
         poses=len(away),
         length_m=float(way[-1]),
-        ape_m=_spread(np.linalg.norm(away, axis=1)),
-        ape_horizontal_m=_spread(np.linalg.norm(away[:, :2], axis=1)),
-        ape_vertical_m=_spread(np.abs(away[:, 2])),
-        ape_deg=_spread(_angles_deg(moved.rotations, true.rotations)),
-        rpe_m=_spread(along),
-        rpe_deg=_spread(turned),
+        ape_m=spread(np.linalg.norm(away, axis=1)),
+        ape_horizontal_m=spread(np.linalg.norm(away[:, :2], axis=1)),
+        ape_vertical_m=spread(np.abs(away[:, 2])),
+        ape_deg=spread(_angles_deg(moved.rotations, true.rotations)),
+        rpe_m=spread(along),
+        rpe_deg=spread(turned),
         rpe_over_m=rpe_over_m,
         end_m=end_m,
         drift_percent=100.0 * end_m / float(way[-1]) if way[-1] > 0 else float("nan"),
@@ -230,7 +230,8 @@ def _angles_deg(one: Array, other: Array) -> Array:
     return np.degrees(np.asarray(turns, np.float64))
 
 
-def _spread(errors: Array) -> Spread:
+def spread(errors: Array) -> Spread:
+    """Of errors (n,), NaN of none."""
     if not len(errors):
         return Spread(*[float("nan")] * 4)
     return Spread(

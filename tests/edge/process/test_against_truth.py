@@ -11,8 +11,9 @@ import pytest
 from edge.cli.main import main
 from edge.cli.trajectories import agreement
 from edge.errors import FormatError
-from edge.process.against_truth import APART, compare, find_pairs
+from edge.process.against_truth import APART, find_pairs
 from edge.process.products_stage import ProductFacts
+from pipeline.evaluation.pair import compare
 from pipeline.gnss.geodesy import Datum
 from pipeline.products.covariance import read_covariance, write_covariance
 from pipeline.products.track import ESTIMATE
@@ -117,11 +118,25 @@ def test_the_command_prints_a_table_and_json(session, truth, capsys):
     assert json.loads(capsys.readouterr().out)[0]["errors"]["ape_m"]["worst"] == 0
 
 
+def test_the_command_writes_a_page_where_it_is_asked_to(session, truth, tmp_path, capsys):
+    page = tmp_path / "plots.html"
+    arguments = ["evaluate", "trajectory", str(session), "--truth", str(truth), "--page"]
+    assert main([*arguments, str(page)]) == 0
+    text = page.read_text()
+    assert "Trajectories of walk" in text
+    assert [word in text for word in ("<h2>map<", "<h2>odom<", "<h2>live")] == [True, True, False]
+    assert main([*arguments, str(tmp_path / "nowhere" / "plots.html")]) == 1
+    assert "give another place with --page" in capsys.readouterr().err
+    assert main(["evaluate", "clocks", str(session), "--truth", str(truth), "--page", str(page)]) == 2
+
+
 def test_what_cannot_be_compared_is_said(session, truth, tmp_path):
     with pytest.raises(FormatError, match="not processed yet"):
         find_pairs(tmp_path, truth)
     with pytest.raises(FormatError, match="the truth is a TUM file"):
         find_pairs(session / "products" / "trajectory.tum", truth)
+    with pytest.raises(FormatError, match="the truth is a TUM file"):
+        find_pairs(session / "products" / "trajectory.tum", tmp_path / "nowhere.tum")
     (truth / "epoch.json").unlink()
     with pytest.raises(FormatError, match="not what the emulated payload writes"):
         find_pairs(session, truth)
