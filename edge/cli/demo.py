@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
     ):
         if args.tui:
             _operate(stage)
+            _what_next(console, stage)
             return exit_codes.GOOD
         folder, verdict = _mission(client, payload, console)
     done, poses = _locate(folder, stage, quiet=args.json)
@@ -110,6 +111,17 @@ def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list
 def _operate(stage: demo.Stage) -> None:
     # The screen is a floor above: named by a string, as in the table of commands.
     importlib.import_module("ui.command").run(stage.socket)
+
+
+def _what_next(console: Console, stage: demo.Stage) -> None:
+    """Of what the operator recorded, how to go on with the last."""
+    sessions = sorted((stage.folder / "recordings").glob("*/session.json"))
+    if sessions:
+        session = sessions[-1].parent
+        console.print(f"recording   {session}", highlight=False)
+        console.print(f"next        mapforest process {session}", highlight=False, soft_wrap=True)
+        told = f"mapforest evaluate trajectory {session} --truth {stage.truth} --over {RPE_OVER_M:g}"
+        console.print(f"            {told}", highlight=False, soft_wrap=True)
 
 
 class _Screen:

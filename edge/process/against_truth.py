@@ -51,7 +51,11 @@ def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
     if offline is not None:
         yield _pair("map", offline, true)
     yield _pair("odom", read_tum(folder / "trajectory_odom.tum"), true, IN_ODOM)
-    live = read_live_poses(target, config) if any(target.glob("*.mcap")) else LivePoses()
+    if any(target.glob("*.mcap")):
+        yield from _live(read_live_poses(target, config), goal, true, offline)
+
+
+def _live(live: LivePoses, goal: Datum | None, true: Trajectory, offline: Trajectory | None) -> Iterator[Pair]:
     in_map = _in_map(live.earth, goal) if live.earth is not None and goal is not None else None
     if in_map is not None and in_map.overlaps(true):
         yield _pair("live map", in_map, true)

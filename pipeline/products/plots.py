@@ -129,7 +129,7 @@ class _Axes:
             bottom = self.height - BOTTOM
             parts.append(f'<line class="grid" x1="{at:.1f}" x2="{at:.1f}" y1="{self.top}" y2="{bottom}"/>')
             parts.append(f'<text x="{at:.1f}" y="{bottom + 14}" text-anchor="middle">{text}</text>')
-        for value, text in _marked(plot.y_names, self.y0, self.y1, max(plot.height // 45, 3)):
+        for value, text in _marked(plot.y_names, self.y0, self.y1, max(self.height // 40, 3)):
             at = float(self.y(np.array(value)))
             parts.append(f'<line class="grid" x1="{LEFT}" x2="{self.width - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/>')
             parts.append(f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{text}</text>')

@@ -18,7 +18,7 @@ h1{font-size:1.5rem;margin:0;overflow-wrap:anywhere}h2{font-size:1.2rem;margin:4
 border-top:1px solid var(--rule)}h3{font-size:1rem;margin:28px 0 4px}p{color:var(--soft);margin:0 0 6px;max-width:44em}
 dl{display:grid;grid-template-columns:repeat(auto-fill,minmax(145px,1fr));gap:10px 20px;margin:18px 0}
 dt{color:var(--soft);font-size:.82rem}dd{margin:0;font-size:1.15rem;font-variant-numeric:tabular-nums}
-svg{width:100%;height:auto}svg.narrow{display:none}
+svg{width:100%;height:auto;display:block}svg.narrow{display:none}
 @media(max-width:640px){svg.narrow{display:block}svg.wide{display:none}h1{font-size:1.2rem}}
 text{fill:var(--soft);font-size:11px}.grid{stroke:var(--rule);stroke-width:1}
 .line{fill:none;stroke-width:1.6;stroke-linejoin:round}.dots{fill:none;stroke-width:4;stroke-linecap:round}
