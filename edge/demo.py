@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from drivers.sim.payload import Payload, PayloadConfig
 from drivers.sim.scenarios import WorldConfig
@@ -22,6 +23,10 @@ from edge.control.messages import Request, Status, Verdict
 from edge.errors import ControlError, EdgeError
 
 UP_S = 60.0
+COMPILED_S = 300.0
+"""The first start of the pipeline on a machine compiles it: 40 s on a core of its own."""
+FINISH_S, LEAVE_S = 60.0, 10.0
+"""A recorder finishes its session; a pipeline has nothing to lose, and does not listen while it compiles."""
 VERDICT_S = 60.0
 TAIL_S = 4.0
 """Recorded at rest after the walk."""
@@ -50,11 +55,16 @@ class Stage:
         return self.folder / "truth"
 
     @property
-    def log(self) -> Path:
-        """What the recorder says."""
-        return self.folder / "recorder.log"
+    def plots(self) -> Path:
+        """The errors of the trajectories, as a page."""
+        return self.folder / "evaluation.html"
+
+    def log(self, service: str) -> Path:
+        """What the recorder or the pipeline says."""
+        return self.folder / f"{service}.log"
 
 
+Process: TypeAlias = "subprocess.Popen[bytes]"
 Watch = Callable[[Status, float], None]
 """Shown each new state with the share of the walk that is done."""
 
@@ -80,22 +90,37 @@ def prepare(stage: Stage, payload: PayloadConfig) -> None:
 @contextmanager
 def recorder(stage: Stage) -> Iterator[ControlClient]:
     """The recorder as a process of its own, as systemd would run it; stopped politely at the end."""
-    command = [sys.executable, "-m", "edge.cli.main", "recorder", "--config", str(stage.config)]
-    with stage.log.open("w", encoding="utf-8") as log:
+    with _service(stage, "recorder", FINISH_S) as process, _connect(stage, process) as client:
+        yield client
+
+
+@contextmanager
+def pipeline(stage: Stage) -> Iterator[Process]:
+    """The live pipeline beside it, likewise."""
+    with _service(stage, "pipeline", LEAVE_S) as process:
+        yield process
+
+
+@contextmanager
+def _service(stage: Stage, name: str, end_s: float) -> Iterator[Process]:
+    command = [sys.executable, "-m", "edge.cli.main", name, "--config", str(stage.config)]
+    with stage.log(name).open("w", encoding="utf-8") as log:
         process = subprocess.Popen(command, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True)
     try:
-        with _connect(stage, process) as client:
-            yield client
+        yield process
     finally:
         process.send_signal(signal.SIGTERM)
-        process.wait(timeout=60)
+        try:
+            process.wait(timeout=end_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
-def _connect(stage: Stage, process: subprocess.Popen[bytes]) -> ControlClient:
+def _connect(stage: Stage, process: Process) -> ControlClient:
     deadline_s = time.monotonic() + UP_S
     while time.monotonic() < deadline_s:
-        if process.poll() is not None:
-            raise EdgeError(f"the recorder ended at once; its words are in {stage.log}:\n{_tail(stage.log)}")
+        _check(stage, "recorder", process)
         try:
             client = ControlClient(stage.socket)
             client.connect()
@@ -103,11 +128,26 @@ def _connect(stage: Stage, process: subprocess.Popen[bytes]) -> ControlClient:
             time.sleep(0.1)
         else:
             return client
-    raise EdgeError(f"the recorder did not open its control socket within {UP_S:.0f} s; see {stage.log}")
+    log = stage.log("recorder")
+    raise EdgeError(f"the recorder did not open its control socket within {UP_S:.0f} s; see {log}")
 
 
-def _tail(log: Path) -> str:
-    return os.linesep.join(log.read_text(encoding="utf-8", errors="replace").splitlines()[-5:])
+def wait_for_pipeline(stage: Stage, process: Process, client: ControlClient) -> None:
+    """Until the live pipeline says where it is, or that it cannot say yet. EdgeError when it does not."""
+    deadline_s = time.monotonic() + COMPILED_S
+    while (status := client.status()).location is None:
+        _check(stage, "pipeline", process)
+        if time.monotonic() > deadline_s:
+            told = "; ".join([f"see {stage.log('pipeline')}", *status.problems])
+            raise EdgeError(f"the live pipeline was not up within {COMPILED_S:.0f} s; {told}")
+        time.sleep(0.2)
+
+
+def _check(stage: Stage, name: str, process: Process) -> None:
+    if process.poll() is not None:
+        words = stage.log(name).read_text(encoding="utf-8", errors="replace").splitlines()[-5:]
+        told = os.linesep.join([f"the {name} ended at once; its words are in {stage.log(name)}:", *words])
+        raise EdgeError(told)
 
 
 def wait_for_sensors(client: ControlClient, watch: Watch) -> None:

@@ -7,6 +7,7 @@ import multiprocessing
 import signal
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
@@ -74,10 +75,12 @@ class _Shared:
 class Payload:
     """`with Payload(config) as payload:` has all emulators running; leaving it ends them."""
 
-    def __init__(self, config: PayloadConfig) -> None:
+    def __init__(self, config: PayloadConfig, hold: Callable[[], None] | None = None) -> None:
+        """hold: called when all emulators are ready; the walk begins when it returns."""
         if config.gnss not in PRESETS:
             raise SimulationError(f"GNSS errors {config.gnss!r}: expected one of {', '.join(PRESETS)}")
         self.config = config
+        self._hold = hold
         self._context: SpawnContext = multiprocessing.get_context("spawn")
         self._epoch_ns = self._context.RawValue("q", 0)
         self._shared: dict[str, _Shared] = {}
@@ -96,14 +99,15 @@ class Payload:
     def __enter__(self) -> Payload:
         if self.config.truth is not None:
             write_truth(build(self.config.world), self.config.truth)
-        for name in self.config.sensors:
-            self._spawn(name)
-        try:
+        with ExitStack() as unless_ready:
+            unless_ready.callback(self.close)
+            for name in self.config.sensors:
+                self._spawn(name)
             for name in self.config.sensors:
                 self._wait(name, READY_S)
-        except SimulationError:
-            self.close()
-            raise
+            if self._hold is not None:
+                self._hold()
+            unless_ready.pop_all()
         self._epoch_ns.value = time.monotonic_ns() + LEAD_NS
         if self.config.truth is not None:
             write_epoch(self.config.truth, self.epoch_ns)

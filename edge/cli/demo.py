@@ -18,14 +18,17 @@ from drivers.sim.scenarios import scenario
 from edge import demo
 from edge.cli import exit_codes
 from edge.cli.ending import end_with_the_terminal
-from edge.cli.evaluate import clock_table, trajectory_table
+from edge.cli.evaluate import clock_table
 from edge.cli.stage_bar import StageBar
+from edge.cli.trajectories import show
 from edge.config import load
 from edge.control.client import ControlClient
 from edge.control.messages import Status, Verdict
-from edge.process.against_truth import Compared, compare
+from edge.process.against_truth import find_pairs
 from edge.process.process import Done, Task, process
 from edge.validation.clock_truth import ClockReport, clock_reports
+from pipeline.evaluation.pair import Compared, compare
+from pipeline.products.comparison import write_comparison
 
 HELP = """the whole mission on the emulated payload: record a walk, validate it, locate it, compare with the truth
 
@@ -33,7 +36,7 @@ example: mapforest demo --seed 3
          mapforest demo --tui      (press the keys yourself: space starts, space twice stops, q leaves)
 
 Three emulated sensors speak their real protocols from one simulated forest; a recorder records them as on the
-payload. The outputs stay in the folder demo/."""
+payload, and the live pipeline finds the way beside it. The outputs stay in the folder demo/."""
 RPE_OVER_M = 10.0
 """The walk of the demonstration is 43 m long."""
 _EXIT = {"PASS": exit_codes.GOOD, "WARN": exit_codes.WARNINGS, "FAIL": exit_codes.FAILED}
@@ -54,10 +57,18 @@ def run(args: argparse.Namespace) -> int:
     stage = demo.Stage(args.folder.absolute())
     config = demo.payload_config(stage, scenario(args.scenario, args.seed))
     demo.prepare(stage, config)
-    console.print("starting the emulated payload (the first time on a machine compiles it: about a minute) ...")
-    with demo.recorder(stage) as client, Payload(config) as payload:
+    console.print(
+        "starting the emulated payload and the live pipeline (the first time on a machine they are compiled: about a "
+        "minute) ..."
+    )
+    with (
+        demo.recorder(stage) as client,
+        demo.pipeline(stage) as live,
+        Payload(config, lambda: _wait(stage, live, client, console)) as payload,
+    ):
         if args.tui:
             _operate(stage)
+            _what_next(console, stage)
             return exit_codes.GOOD
         folder, verdict = _mission(client, payload, console)
     done, poses = _locate(folder, stage, quiet=args.json)
@@ -66,12 +77,18 @@ def run(args: argparse.Namespace) -> int:
         told = {"session": str(folder), "verdict": verdict, "clocks": reports, "trajectory": poses}
         print(msgspec.json.encode(told).decode())
     else:
-        console.print(trajectory_table(poses))
+        show(console, poses)
         _conclude(console, folder, verdict, reports)
         console.print(f"products    {done.folder}", highlight=False)
         for name, meaning in done.facts.files.items():
             console.print(f"            {name}  {meaning}", highlight=False)
+        console.print(f"evaluation  {stage.plots}  (plots of the errors above)", highlight=False)
     return _EXIT[verdict.verdict]
+
+
+def _wait(stage: demo.Stage, live: demo.Process, client: ControlClient, console: Console) -> None:
+    console.print("the sensors are ready; waiting for the live pipeline, so that it sees the walk from the start ...")
+    demo.wait_for_pipeline(stage, live, client)
 
 
 def _mission(client: ControlClient, payload: Payload, console: Console) -> tuple[Path, Verdict]:
@@ -86,12 +103,25 @@ def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list
     logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     with StageBar(quiet=quiet) as bar:
         done = process(Task([folder]), load(stage.config), bar)
-    return done, compare(folder, stage.truth, RPE_OVER_M)
+    pairs = find_pairs(folder, stage.truth)
+    write_comparison(stage.plots, f"Trajectories of {folder.name}", pairs)
+    return done, compare(pairs, RPE_OVER_M)
 
 
 def _operate(stage: demo.Stage) -> None:
     # The screen is a floor above: named by a string, as in the table of commands.
     importlib.import_module("ui.command").run(stage.socket)
+
+
+def _what_next(console: Console, stage: demo.Stage) -> None:
+    """Of what the operator recorded, how to go on with the last."""
+    sessions = sorted((stage.folder / "recordings").glob("*/session.json"))
+    if sessions:
+        session = sessions[-1].parent
+        console.print(f"recording   {session}", highlight=False)
+        console.print(f"next        mapforest process {session}", highlight=False, soft_wrap=True)
+        told = f"mapforest evaluate trajectory {session} --truth {stage.truth} --over {RPE_OVER_M:g}"
+        console.print(f"            {told}", highlight=False, soft_wrap=True)
 
 
 class _Screen:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,20 +12,25 @@ from rich.table import Table
 
 from edge.cli import exit_codes
 from edge.cli.words import console
+from edge.config import load
+from edge.errors import EdgeError, UsageError
 from edge.validation.clock_truth import ClockReport, clock_reports
 
 if TYPE_CHECKING:  # heavy: scipy
-    from edge.process.against_truth import Compared
+    from pipeline.evaluation.pair import Pair
 
 HELP = """compare estimates with ground truth
 
 example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth
+         mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth --page plots.html
          mapforest evaluate trajectory estimate.tum --truth truth.tum --over 50
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
-trajectory: what `mapforest process` made of a session, or a TUM file, against the emulated payload's truth or another
-TUM file in the same time: APE and RPE (as in evo) as it is, and laid over the truth by yaw or in all axes; NEES."""
+trajectory: what `mapforest process` made of a session and what the live pipeline recorded in it, or a TUM file, against
+the emulated payload's truth or another TUM file in the same time: APE and RPE (as in evo) as it is, and laid over the
+truth by yaw or in all axes; NEES (1 is honest). Live and offline are compared on the Earth: how far they are apart, and
+whether their covariances allow for that."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,12 +44,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--settle", type=float, default=10.0, metavar="S", help="clocks: leave out this much of an epoch"
     )
     parser.add_argument("--over", type=float, default=100.0, metavar="M", help="trajectory: stretches of the RPE")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="trajectory: also write plots, as one HTML page")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     if args.what == "trajectory":
         return _trajectory(args)
+    if args.page is not None:
+        raise UsageError("--page: there are plots of trajectories only; `mapforest evaluate trajectory`")
     reports = clock_reports(args.session, args.truth, args.settle)
     if args.json:
         print(msgspec.json.encode(reports).decode())
@@ -55,33 +62,28 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _trajectory(args: argparse.Namespace) -> int:
-    from edge.process.against_truth import compare
+    from edge.cli.trajectories import show
+    from edge.process.against_truth import find_pairs
+    from pipeline.evaluation.pair import compare
 
-    found = compare(args.session, args.truth, args.over)
+    pairs = find_pairs(args.session, args.truth, load(args.config))
+    found = compare(pairs, args.over)
+    if args.page is not None:
+        _write_page(args.page, args.session, pairs)
     if args.json:
         print(msgspec.json.encode(found).decode())
     else:
-        console().print(trajectory_table(found))
+        show(console(), found)
     return exit_codes.GOOD
 
 
-def trajectory_table(found: list[Compared]) -> Table:
-    """The comparison for people."""
-    first = found[0].errors
-    title = f"trajectory: {first.poses:,} poses over {first.length_m:,.1f} m; APE, and RPE over {first.rpe_over_m:g} m"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
-    # What fits 80 columns; --json has the rest.
-    columns = ("rmse m", "worst", "across", "up", "deg", "RPE m", "end m", "drift %", "NEES", "in 95 %")
-    for column in ("frame", "aligned", *columns):
-        table.add_column(column, justify="left" if column in {"frame", "aligned"} else "right", no_wrap=True)
-    for one in found:
-        e = one.errors
-        metres = (e.ape_m.rmse, e.ape_m.worst, e.ape_horizontal_m.rmse, e.ape_vertical_m.rmse)
-        figures = [*(f"{value:.3f}" for value in metres), f"{e.ape_deg.rmse:.2f}", f"{e.rpe_m.rmse:.3f}"]
-        figures += [f"{e.end_m:.3f}", f"{e.drift_percent:.2f}"]
-        figures += [f"{e.nees:.2f}", f"{e.within_95:.0%}"] if isfinite(e.nees) else ["", ""]
-        table.add_row(one.trajectory, e.alignment, *(figure.replace("nan", "-") for figure in figures))
-    return table
+def _write_page(path: Path, session: Path, pairs: list[Pair]) -> None:
+    from pipeline.products.comparison import write_comparison
+
+    try:
+        write_comparison(path, f"Trajectories of {session.absolute().name}", pairs)
+    except OSError as error:
+        raise EdgeError(f"{path}: cannot be written ({error.strerror}); give another place with --page") from error
 
 
 def clock_table(reports: list[ClockReport]) -> Table:

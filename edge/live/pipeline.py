@@ -26,6 +26,7 @@ from edge.replay.geometry import find_geometry
 from edge.replay.pairing import Pairing, Sweep
 from edge.ros.frames import BASE_LINK, LIDAR
 from pipeline.estimates import GlobalPose, OdometryEstimate
+from pipeline.odometry.warm import warm_up
 
 log = logging.getLogger(__name__)
 
@@ -137,10 +138,15 @@ class LivePipeline:
 
 
 def serve(config: Config, folder: Path, stop: threading.Event) -> None:
-    """Run against the recorder whose sockets are in `folder`; waits for it, and for it to come back."""
+    """Run against the recorder whose sockets are in `folder`; waits for it, and for it to come back.
+
+    The kernels are compiled first: what came meanwhile would be lost, and the start of a walk with it.
+    """
     pipeline = LivePipeline(config)
+    log.info("loading the compiled kernels (the first time on a machine they are compiled: a minute)")
+    warm_up(config.odometry)
     with BusClient(folder, pipeline.topics) as bus:
         log.info("live pipeline is up, sockets in %s", folder)
         pipeline.run(bus, stop)
-        lost = ", ".join(f"{count} of {topic}" for topic, count in bus.lost.items()) or "none"
+        lost = ", ".join(f"{count} of {topic}" for topic, count in bus.lost.items() if count) or "none"
         log.info("live pipeline ends; messages lost on the bus: %s", lost)

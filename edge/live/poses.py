@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from edge.recording.messages import Covariance, GnssPose, OdometryPose, Transforms
 from edge.ros.frames import BASE_LINK, EARTH, MAP, ODOM, Transform
 from pipeline.estimates import GlobalPose, MapToOdom, OdometryEstimate
-from pipeline.gnss.geodesy import ecef
+from pipeline.gnss.geodesy import Datum
 
 Array = npt.NDArray[np.float64]
 Three = tuple[float, float, float]
@@ -48,8 +48,8 @@ def transforms(estimate: OdometryEstimate, state: MapToOdom | None, receive_ns: 
 
 def _earth_to_map(latitude_deg: float, longitude_deg: float, height_m: float) -> Transform:
     """East, north and up at the datum, in Earth-centred axes."""
-    turn = Rotation.from_euler("ZX", [longitude_deg + 90.0, 90.0 - latitude_deg], degrees=True)
-    return Transform(EARTH, MAP, _three(ecef(latitude_deg, longitude_deg, height_m)), _quaternion(turn.as_matrix()))
+    datum = Datum(latitude_deg, longitude_deg, height_m)
+    return Transform(EARTH, MAP, _three(datum.origin_m), _quaternion(datum.turn))
 
 
 def _ros_covariance(covariance: Array, rotation: Array) -> Covariance:

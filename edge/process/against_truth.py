@@ -1,75 +1,91 @@
-"""What `mapforest process` made, or any trajectory, against what is true."""
+"""What `mapforest process` made, what the live pipeline recorded, or any trajectory, against what is true."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
+from edge.config import Config
 from edge.errors import FormatError
 from edge.process.products_stage import ProductFacts
-from pipeline.evaluation.trajectory import Alignment, Array, Trajectory, TrajectoryErrors, read_tum, trajectory_errors
+from edge.replay.poses import LivePoses, read_live_poses
+from pipeline.evaluation.pair import ALIGNMENTS, Pair
+from pipeline.evaluation.trajectory import Alignment, Trajectory, read_tum, together
 from pipeline.gnss.geodesy import Datum
 from pipeline.products.covariance import read_covariance
 
-ALIGNMENTS: tuple[Alignment, ...] = ("none", "yaw", "se3")
+IN_ODOM: tuple[Alignment, ...] = ("yaw", "se3")
+"""`odom` begins anywhere: as it is, it says nothing."""
+APART = "live - offline"
+"""The name of the pair that sets the live `map` against the offline one."""
 
 
-class Compared(msgspec.Struct, frozen=True):
-    """One trajectory against the truth."""
-
-    trajectory: str
-    errors: TrajectoryErrors
-
-
-def compare(target: Path, truth: Path, over_m: float = 100.0) -> list[Compared]:
+def find_pairs(target: Path, truth: Path, config: Config | None = None) -> list[Pair]:
     """target: a session, its products, or a TUM file. truth: a TUM file in the same time and frame, or the folder that
-    the emulated payload wrote. FormatError when they cannot be compared."""
+    the emulated payload wrote. FormatError when they cannot be compared.
+
+    A session is compared offline, and live where a live pipeline ran; its `map` is put to the truth's by both datums.
+    """
     try:
         if target.is_file():
-            return _all(target.name, read_tum(target), _plain_truth(truth), over_m)
-        return _products(_products_folder(target), truth, over_m)
+            return [_pair(target.name, read_tum(target), _plain_truth(truth))]
+        return list(_of_session(target, truth, config or Config()))
     except ValueError as error:
         raise FormatError(f"{target} against {truth}: {error}") from error
 
 
-def _products(folder: Path, truth: Path, over_m: float) -> list[Compared]:
+def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
+    folder = _products_folder(target)
     facts = msgspec.json.decode((folder / "products.json").read_bytes(), type=ProductFacts)
     true = _plain_truth(truth) if truth.is_file() else _simulated(truth, facts)
-    found: list[Compared] = []
-    if (folder / "trajectory.tum").exists():
-        estimate, covariance = read_tum(folder / "trajectory.tum"), None
-        stamps, read = read_covariance(folder / "covariance.csv")
-        if len(stamps) == len(estimate.stamps_ns):
-            covariance = read
-        if truth.is_dir():
-            estimate = _rebased(estimate, facts, truth)
-        found += _all("map", estimate, true, over_m, covariance=covariance)
-    odom = read_tum(folder / "trajectory_odom.tum")
-    return [*found, *_all("odom", odom, true, over_m, alignments=ALIGNMENTS[1:])]
+    here = Datum(*facts.datum) if facts.datum is not None else None
+    goal = here if truth.is_file() else _world(truth)
+    offline = _offline(folder)
+    if offline is not None and here is not None and goal is not None:
+        offline = _in_map(offline.moved(here.turn, here.origin_m), goal)
+    if offline is not None:
+        yield _pair("map", offline, true)
+    yield _pair("odom", read_tum(folder / "trajectory_odom.tum"), true, IN_ODOM)
+    if any(target.glob("*.mcap")):
+        yield from _live(read_live_poses(target, config), goal, true, offline)
 
 
-def _all(
-    name: str,
-    estimate: Trajectory,
-    true: Trajectory,
-    over_m: float,
-    *,
-    covariance: Array | None = None,
-    alignments: tuple[Alignment, ...] = ALIGNMENTS,
-) -> list[Compared]:
-    return [
-        Compared(name, trajectory_errors(estimate, true, kind, covariance=covariance, rpe_over_m=over_m))
-        for kind in alignments
-    ]
+def _live(live: LivePoses, goal: Datum | None, true: Trajectory, offline: Trajectory | None) -> Iterator[Pair]:
+    in_map = _in_map(live.earth, goal) if live.earth is not None and goal is not None else None
+    if in_map is not None and in_map.overlaps(true):
+        yield _pair("live map", in_map, true)
+    if live.odom is not None and live.odom.overlaps(true):
+        yield _pair("live odom", live.odom, true, IN_ODOM)
+    if in_map is not None and offline is not None and in_map.overlaps(offline):
+        yield Pair(APART, *together(in_map, offline), ("none",), against="offline trajectory")
+
+
+def _pair(name: str, estimate: Trajectory, true: Trajectory, alignments: tuple[Alignment, ...] = ALIGNMENTS) -> Pair:
+    return Pair(name, estimate.within(true), true, alignments)
+
+
+def _offline(products: Path) -> Trajectory | None:
+    """In `map`; None for a session that could not be placed."""
+    if not (products / "trajectory.tum").exists():
+        return None
+    found = read_tum(products / "trajectory.tum")
+    stamps, covariance = read_covariance(products / "covariance.csv")
+    return replace(found, covariance=covariance) if len(stamps) == len(found.stamps_ns) else found
+
+
+def _in_map(earth: Trajectory, datum: Datum) -> Trajectory:
+    """From Earth-centred axes."""
+    return earth.moved(datum.turn.T, -datum.turn.T @ datum.origin_m)
 
 
 def _plain_truth(path: Path) -> Trajectory:
-    if path.is_dir():
-        raise FormatError(f"{path}: with a plain trajectory the truth is a TUM file, such as {path / 'poses.tum'}")
+    if not path.is_file():
+        raise FormatError(f"{path}: with a plain trajectory the truth is a TUM file, such as poses.tum of a simulation")
     return read_tum(path)
 
 
@@ -81,14 +97,10 @@ def _simulated(folder: Path, facts: ProductFacts) -> Trajectory:
     return read_tum(folder / "poses.tum").shifted(epoch_ns + facts.host_offset_ns)
 
 
-def _rebased(estimate: Trajectory, facts: ProductFacts, truth: Path) -> Trajectory:
-    """From the session's datum to the simulated world's."""
+def _world(truth: Path) -> Datum:
+    """Where the simulated world lies."""
     world = _json(truth / "world.json", "datum")
-    goal = Datum(world["latitude_deg"], world["longitude_deg"], world["height_m"])
-    assert facts.datum is not None
-    datum = Datum(*facts.datum)
-    positions = np.array([goal.enu(*datum.geodetic(position)) for position in estimate.positions_m])
-    return Trajectory(estimate.stamps_ns, positions, estimate.rotations)
+    return Datum(world["latitude_deg"], world["longitude_deg"], world["height_m"])
 
 
 def _products_folder(target: Path) -> Path:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from edge.errors import FormatError
 from edge.ros import schemas
 from edge.ros.cdr import CdrReader
+from edge.ros.decode_poses import decode_odometry, decode_pose
 from edge.ros.frames import Transform
 
 CUSTOM_POINT = np.dtype(
@@ -265,5 +266,7 @@ DECODERS: dict[str, Callable[[bytes], Any]] = {
     schemas.LOG: decode_log,
     schemas.DIAGNOSTIC_ARRAY: decode_diagnostics,
     schemas.TF_MESSAGE: decode_transforms,
+    schemas.ODOMETRY: decode_odometry,
+    schemas.POSE: decode_pose,
 }
 """ROS type -> decoder."""

@@ -5,7 +5,7 @@ Terms as in `evo` and Zhang and Scaramuzza (2018). Errors are of positions, metr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -17,30 +17,58 @@ from scipy.spatial.transform import Rotation, Slerp
 Array = npt.NDArray[np.float64]
 Alignment = Literal["none", "yaw", "se3"]
 CHI2_3_95 = 7.815
+FEWEST = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """stamps_ns: (n,) int64, rising. positions_m: (n, 3). rotations: (n, 3, 3)."""
+    """stamps_ns: (n,) int64, rising. positions_m: (n, 3). rotations: (n, 3, 3).
+
+    covariance: (n, 3, 3) of the positions, None where nobody states one.
+    """
 
     stamps_ns: npt.NDArray[np.int64]
     positions_m: Array
     rotations: Array
+    covariance: Array | None = None
 
     def shifted(self, by_ns: int) -> Trajectory:
         """In another clock."""
-        return Trajectory(self.stamps_ns + by_ns, self.positions_m, self.rotations)
+        return replace(self, stamps_ns=self.stamps_ns + by_ns)
+
+    def moved(self, turn: Array, by_m: Array) -> Trajectory:
+        """In another frame, where this one's axes are turned (3, 3) and its origin is at `by_m` (3,)."""
+        positions = np.asarray(self.positions_m @ turn.T + by_m)
+        covariance = None if self.covariance is None else np.asarray(turn @ self.covariance @ turn.T)
+        return Trajectory(self.stamps_ns, positions, turn @ self.rotations, covariance)
 
     def chosen(self, which: npt.NDArray[np.bool_]) -> Trajectory:
         """Some of its poses."""
-        return Trajectory(self.stamps_ns[which], self.positions_m[which], self.rotations[which])
+        covariance = None if self.covariance is None else self.covariance[which]
+        return Trajectory(self.stamps_ns[which], self.positions_m[which], self.rotations[which], covariance)
+
+    def overlaps(self, other: Trajectory) -> bool:
+        """Whether enough poses lie between the first and the last of another."""
+        return int(self._inside(other).sum()) >= FEWEST
+
+    def within(self, other: Trajectory) -> Trajectory:
+        """Those poses. ValueError when there are too few."""
+        if not self.overlaps(other):
+            raise ValueError("the trajectories do not overlap in time")
+        return self.chosen(self._inside(other))
+
+    def _inside(self, other: Trajectory) -> npt.NDArray[np.bool_]:
+        return np.asarray((self.stamps_ns >= other.stamps_ns[0]) & (self.stamps_ns <= other.stamps_ns[-1]))
 
     def at(self, stamps_ns: npt.NDArray[np.int64]) -> Trajectory:
         """Between its poses; the stamps lie within it."""
         origin = self.stamps_ns[0]
         times, wanted = (self.stamps_ns - origin) / 1e9, (stamps_ns - origin) / 1e9
-        positions = np.column_stack([np.interp(wanted, times, axis) for axis in self.positions_m.T])
-        return Trajectory(stamps_ns, positions, Slerp(times, Rotation.from_matrix(self.rotations))(wanted).as_matrix())
+        rotations = Slerp(times, Rotation.from_matrix(self.rotations))(wanted).as_matrix()
+        covariance = None
+        if self.covariance is not None:
+            covariance = _between(times, self.covariance.reshape(-1, 9), wanted).reshape(-1, 3, 3)
+        return Trajectory(stamps_ns, _between(times, self.positions_m, wanted), rotations, covariance)
 
 
 class Spread(msgspec.Struct, frozen=True):
@@ -92,36 +120,34 @@ def trajectory_errors(
     truth: Trajectory,
     alignment: Alignment = "none",
     *,
-    covariance: Array | None = None,
     rpe_over_m: float = 100.0,
 ) -> TrajectoryErrors:
-    """Both in one clock. covariance: (n, 3, 3) of the estimate's positions. ValueError without an overlap."""
-    within = (estimate.stamps_ns >= truth.stamps_ns[0]) & (estimate.stamps_ns <= truth.stamps_ns[-1])
-    if within.sum() < 3:
-        raise ValueError("the trajectories do not overlap in time")
-    estimate, covariance = estimate.chosen(within), covariance[within] if covariance is not None else None
+    """Both in one clock. ValueError without an overlap."""
+    estimate = estimate.within(truth)
     true = truth.at(estimate.stamps_ns)
     moved = aligned(estimate, true, alignment)
     away = moved.positions_m - true.positions_m
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(true.positions_m, axis=0), axis=1))])
+    way = travelled_m(true)
     along, turned = relative_errors(moved, true, way, rpe_over_m)
     end_m = float(np.linalg.norm(_from_start(moved)[-1] - _from_start(true)[-1]))
-    nees, within_95 = _honesty(away, covariance) if covariance is not None and alignment == "none" else (np.nan,) * 2
+    squared = np.full(1, np.nan)
+    if estimate.covariance is not None and alignment == "none":
+        squared = normalised_square(away, estimate.covariance)
     return TrajectoryErrors(
         alignment=alignment,
         poses=len(away),
         length_m=float(way[-1]),
-        ape_m=_spread(np.linalg.norm(away, axis=1)),
-        ape_horizontal_m=_spread(np.linalg.norm(away[:, :2], axis=1)),
-        ape_vertical_m=_spread(np.abs(away[:, 2])),
-        ape_deg=_spread(_angles_deg(moved.rotations, true.rotations)),
-        rpe_m=_spread(along),
-        rpe_deg=_spread(turned),
+        ape_m=spread(np.linalg.norm(away, axis=1)),
+        ape_horizontal_m=spread(np.linalg.norm(away[:, :2], axis=1)),
+        ape_vertical_m=spread(np.abs(away[:, 2])),
+        ape_deg=spread(_angles_deg(moved.rotations, true.rotations)),
+        rpe_m=spread(along),
+        rpe_deg=spread(turned),
         rpe_over_m=rpe_over_m,
         end_m=end_m,
         drift_percent=100.0 * end_m / float(way[-1]) if way[-1] > 0 else float("nan"),
-        nees=float(nees),
-        within_95=float(within_95),
+        nees=float(squared.mean() / 3.0),
+        within_95=float((squared < CHI2_3_95).mean()) if np.isfinite(squared).all() else float("nan"),
     )
 
 
@@ -132,8 +158,25 @@ def aligned(estimate: Trajectory, true: Trajectory, alignment: Alignment) -> Tra
     middle, goal = estimate.positions_m.mean(axis=0), true.positions_m.mean(axis=0)
     cross = (true.positions_m - goal).T @ (estimate.positions_m - middle)
     turn = _yaw(cross) if alignment == "yaw" else _turn(cross)
-    positions = (estimate.positions_m - middle) @ turn.T + goal
-    return Trajectory(estimate.stamps_ns, positions, turn @ estimate.rotations)
+    return estimate.moved(turn, goal - turn @ middle)
+
+
+def together(one: Trajectory, other: Trajectory) -> tuple[Trajectory, Trajectory]:
+    """Two estimates of one way at the stamps of the first, the covariance of their difference with the first.
+
+    The sum of both, as if their errors were independent: what they share makes the difference smaller than that says.
+    """
+    one = one.within(other)
+    other = other.at(one.stamps_ns)
+    if one.covariance is None or other.covariance is None:
+        return one, other
+    return replace(one, covariance=one.covariance + other.covariance), other
+
+
+def travelled_m(one: Trajectory) -> Array:
+    """(n,) length of the way up to each pose."""
+    steps = np.linalg.norm(np.diff(one.positions_m, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def relative_errors(estimate: Trajectory, true: Trajectory, way_m: Array, over_m: float) -> tuple[Array, Array]:
@@ -155,9 +198,13 @@ def relative_errors(estimate: Trajectory, true: Trajectory, way_m: Array, over_m
     return np.linalg.norm(moved - moved_true, axis=1), _angles_deg(turned, turned_true)
 
 
-def _honesty(away: Array, covariance: Array) -> tuple[float, float]:
-    squared = np.einsum("ni,ni->n", away, np.linalg.solve(covariance, away[..., None])[..., 0])
-    return float(squared.mean() / 3.0), float((squared < CHI2_3_95).mean())
+def normalised_square(away: Array, covariance: Array) -> Array:
+    """(n,) squared Mahalanobis distances of errors (n, 3): chi-square with three degrees of freedom when honest."""
+    return np.asarray(np.einsum("ni,ni->n", away, np.linalg.solve(covariance, away[..., None])[..., 0]))
+
+
+def _between(times: Array, values: Array, wanted: Array) -> Array:
+    return np.column_stack([np.interp(wanted, times, column) for column in values.T])
 
 
 def _from_start(one: Trajectory) -> Array:
@@ -183,7 +230,8 @@ def _angles_deg(one: Array, other: Array) -> Array:
     return np.degrees(np.asarray(turns, np.float64))
 
 
-def _spread(errors: Array) -> Spread:
+def spread(errors: Array) -> Spread:
+    """Of errors (n,), NaN of none."""
     if not len(errors):
         return Spread(*[float("nan")] * 4)
     return Spread(

@@ -22,17 +22,14 @@ class Datum:
     longitude_deg: float
     height_m: float
 
-    def enu(self, latitude_deg: float, longitude_deg: float, height_m: float) -> Array:
-        """(3,) metres in `map` of a point on the Earth (degrees, metres above the ellipsoid)."""
-        origin = ecef(self.latitude_deg, self.longitude_deg, self.height_m)
-        return self._axes() @ (ecef(latitude_deg, longitude_deg, height_m) - origin)
+    @property
+    def origin_m(self) -> Array:
+        """(3,) of `map` in Earth-centred axes."""
+        return ecef(self.latitude_deg, self.longitude_deg, self.height_m)
 
-    def geodetic(self, enu_m: Array) -> tuple[float, float, float]:
-        """Latitude, longitude (degrees) and ellipsoidal height (m) of a point (3,) in `map`."""
-        return geodetic(ecef(self.latitude_deg, self.longitude_deg, self.height_m) + self._axes().T @ enu_m)
-
-    def _axes(self) -> Array:
-        """(3, 3), rows east, north, up in Earth-centred axes."""
+    @property
+    def turn(self) -> Array:
+        """(3, 3) from `map` into Earth-centred axes: its columns are east, north and up."""
         latitude, longitude = math.radians(self.latitude_deg), math.radians(self.longitude_deg)
         sin_lat, cos_lat, sin_lon, cos_lon = (
             *(math.sin(latitude), math.cos(latitude)),
@@ -40,11 +37,19 @@ class Datum:
         )
         return np.array(
             [
-                [-sin_lon, cos_lon, 0.0],
-                [-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat],
-                [cos_lat * cos_lon, cos_lat * sin_lon, sin_lat],
+                [-sin_lon, -sin_lat * cos_lon, cos_lat * cos_lon],
+                [cos_lon, -sin_lat * sin_lon, cos_lat * sin_lon],
+                [0.0, cos_lat, sin_lat],
             ]
         )
+
+    def enu(self, latitude_deg: float, longitude_deg: float, height_m: float) -> Array:
+        """(3,) metres in `map` of a point on the Earth (degrees, metres above the ellipsoid)."""
+        return self.turn.T @ (ecef(latitude_deg, longitude_deg, height_m) - self.origin_m)
+
+    def geodetic(self, enu_m: Array) -> tuple[float, float, float]:
+        """Latitude, longitude (degrees) and ellipsoidal height (m) of a point (3,) in `map`."""
+        return geodetic(self.origin_m + self.turn @ enu_m)
 
 
 def ecef(latitude_deg: float, longitude_deg: float, height_m: float) -> Array:

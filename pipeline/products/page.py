@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.messages import FixQuality, GnssFix
+from pipeline.products import sheet
 from pipeline.products.covariance import horizontal_sigma_m, sigmas
 from pipeline.products.plots import Dots, Line, Plot
 
@@ -22,20 +22,6 @@ _QUALITIES = (
     ("float", (FixQuality.RTK_FLOAT,)),
     ("fixed", (FixQuality.RTK_FIXED,)),
 )
-_STYLE = """
-:root{color-scheme:light dark;--ink:#1d2620;--soft:#5c6a60;--paper:#fbfcfa;--rule:#d9e0d8;
---a:#1f6f4a;--b:#c2571a;--c:#3b62b5;--band:#f3d9a4}
-@media(prefers-color-scheme:dark){:root{--ink:#e4ebe4;--soft:#9aa89d;--paper:#151a16;--rule:#313b33;
---a:#5fc795;--b:#f0955a;--c:#8fb0f5;--band:#5a4518}}
-body{margin:0 auto;max-width:1000px;padding:24px 20px 60px;background:var(--paper);color:var(--ink);
-font:15px/1.5 system-ui,sans-serif}
-h1{font-size:1.5rem;margin:0}h2{font-size:1rem;margin:28px 0 4px}
-dl{display:grid;grid-template-columns:repeat(auto-fill,minmax(190px,1fr));gap:10px 20px;margin:18px 0}
-dt{color:var(--soft);font-size:.82rem}dd{margin:0;font-size:1.15rem;font-variant-numeric:tabular-nums}
-svg{width:100%;height:auto;display:block}text{fill:var(--soft);font-size:11px}.grid{stroke:var(--rule);stroke-width:1}
-.line{fill:none;stroke-width:1.6;stroke-linejoin:round}.dots{fill:none;stroke-width:4;stroke-linecap:round}
-.a{stroke:var(--a)}.b{stroke:var(--b)}.c{stroke:var(--c)}.band{fill:var(--band)}ul{color:var(--soft);padding-left:1.2em}
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +44,9 @@ class Story:
 
 def write_page(path: Path, story: Story) -> None:
     """Write it."""
-    facts = "".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in story.facts.items())
-    notes = "".join(f"<li>{escape(note)}</li>" for note in story.notes)
-    plots = "\n".join(f"<h2>{escape(title)}</h2>\n{plot.svg()}" for title, plot in _plots(story))
-    path.write_text(
-        f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>{escape(story.title)}</title><style>{_STYLE}</style>\n<h1>{escape(story.title)}</h1>\n"
-        f"<dl>{facts}</dl>\n{plots}\n<h2>Notes</h2><ul>{notes}</ul>\n</html>\n",
-        encoding="utf-8",
-    )
+    figures = [sheet.figure(title, plot) for title, plot in _plots(story)]
+    parts = [sheet.facts(story.facts), *figures, sheet.notes(story.notes)]
+    path.write_text(sheet.sheet(story.title, parts), encoding="utf-8")
 
 
 def degenerate_stretches(seconds: Array, degenerate: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:

@@ -1,6 +1,13 @@
+"""The demonstration's services are set up, brought up, told when they fail, and ended politely."""
+
+from __future__ import annotations
+
+import pytest
+
 from drivers.sim.scenarios import scenario
 from edge import demo
 from edge.config import load
+from edge.errors import EdgeError
 from edge.paths import control_socket
 
 
@@ -11,3 +18,33 @@ def test_the_demonstration_configures_a_recorder_on_loopback(tmp_path):
     assert set(config.sensors) == {"livox", "reach", "gopro"}
     assert config.recording.folder == str(tmp_path / "recordings")
     assert control_socket(config) == stage.socket
+
+
+@pytest.fixture
+def stage(tmp_path):
+    """Without sensors: they would be anybody's who emulates some on this machine."""
+    stage = demo.Stage(tmp_path)
+    limits = "min_free_mib = 0\nmin_free_percent = 0"
+    stage.config.write_text(
+        f'[recording]\nfolder = "{tmp_path}/recordings"\n{limits}\n[control]\nsocket = "{stage.socket}"\n[sensors]\n'
+    )
+    return stage
+
+
+def test_recorder_and_pipeline_come_up_know_each_other_and_end_politely(stage):
+    with demo.recorder(stage) as client:
+        with demo.pipeline(stage) as process:
+            demo.wait_for_pipeline(stage, process, client)
+            location = client.status().location
+        assert process.returncode == 0
+    assert location is not None
+    assert location.state == "starting"
+    assert "live pipeline ends; messages lost on the bus: none" in stage.log("pipeline").read_text()
+
+
+def test_a_pipeline_that_ends_at_once_is_told_with_its_words(stage):
+    stage.config.write_text(stage.config.read_text() + "[bus]\nenabled = false\n")
+    with demo.recorder(stage) as client, demo.pipeline(stage) as process:
+        process.wait()
+        with pytest.raises(EdgeError, match=r"the pipeline ended at once(?s:.*)bus\.enabled is false"):
+            demo.wait_for_pipeline(stage, process, client)

@@ -1,6 +1,7 @@
 import json
 import random
 import socket
+import time
 
 import pytest
 
@@ -37,6 +38,23 @@ def test_an_emulator_that_was_killed_comes_back_into_the_same_walk(tmp_path, add
     assert not payload.processes["reach"].is_alive()
     assert (tmp_path / "poses.tum").exists()
     assert json.loads((tmp_path / "world.json").read_text())["name"] == "demo"
+
+
+def test_the_walk_begins_when_it_is_let_go_and_never_when_that_fails(address):
+    config = PayloadConfig(sensors=("reach",), reach_address=address)
+    held_ns = []
+    with Payload(config, lambda: held_ns.append(time.monotonic_ns())) as payload:
+        assert len(held_ns) == 1
+        assert payload.epoch_ns > held_ns[0]
+
+    def fail():
+        raise OSError("nobody is there")
+
+    payload = Payload(config, fail)
+    with pytest.raises(OSError, match="nobody is there"), payload:
+        pass
+    assert not payload.processes["reach"].is_alive()
+    assert payload.epoch_ns == 0
 
 
 def test_the_tables_are_configurations_of_the_drivers():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,11 +84,11 @@ def test_honest_covariance_has_a_nees_of_one_and_a_boastful_one_more():
     truth = loop(4000)
     estimate = disturbed(truth, 0.3)
     honest = np.tile(np.eye(3) * 0.09, (4000, 1, 1))
-    errors = trajectory_errors(estimate, truth, covariance=honest)
+    errors = trajectory_errors(replace(estimate, covariance=honest), truth)
     assert errors.nees == pytest.approx(1.0, abs=0.06)
     assert errors.within_95 == pytest.approx(0.95, abs=0.015)
-    assert trajectory_errors(estimate, truth, covariance=honest / 100).nees > 50
-    assert np.isnan(trajectory_errors(estimate, truth, "se3", covariance=honest).nees)
+    assert trajectory_errors(replace(estimate, covariance=honest / 100), truth).nees > 50
+    assert np.isnan(trajectory_errors(replace(estimate, covariance=honest), truth, "se3").nees)
 
 
 def test_trajectories_are_read_to_the_nanosecond_and_others_refused(tmp_path: Path):
