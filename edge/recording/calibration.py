@@ -6,13 +6,15 @@ The file has a table for each frame that differs from nominal:
     translation_m = [0.06, 0.0, -0.07]
     rotation_xyzw = [-0.5, 0.5, -0.5, 0.5]
 
-Each is the pose of that frame in `base_link`, which is the IMU (x forward, y left, z up).
+Each is the pose of that frame in `base_link`, which is the IMU (x forward, y left, z up). `[intrinsics]` is the lens,
+`[timing]` how late the camera's stamps are, `[about]` whose they are and how well they were found.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
@@ -40,10 +42,51 @@ class Frames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gnss_antenna: Pose = Pose((-0.05, 0.0, 0.20))
 
 
+class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Of one lens mode; the default is the nominal linear lens of the preview stream, 89 degrees across."""
+
+    width_px: int = 848
+    height_px: int = 480
+    focal_px: tuple[float, float] = (432.0, 432.0)
+    centre_px: tuple[float, float] = (423.5, 239.5)
+    model: Literal["pinhole", "fisheye"] = "pinhole"
+    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    residual_px: float = 0.0
+    """RMS of the calibration; 0: nominal."""
+
+
+class Timing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """camera_late_s: by so much the camera's stamps are later than the exposure they stand for."""
+
+    camera_late_s: float = 0.0
+    sigma_s: float = 0.02
+
+
+class About(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which unit, when, and how sure. Serial numbers as the sensors tell them; empty: not known."""
+
+    date: str = ""
+    lidar_serial: str = ""
+    camera_serial: str = ""
+    camera_lens: str = ""
+    camera_rotation_sigma_deg: float = 1.0
+    camera_translation_sigma_m: float = 0.02
+    notes: str = ""
+
+
+class CalibrationFile(Frames, frozen=True, forbid_unknown_fields=True):
+    """The whole file."""
+
+    intrinsics: Intrinsics = Intrinsics()
+    timing: Timing = Timing()
+    about: About = About()
+
+
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """The static transforms, and the text of the file they are from (empty: nominal)."""
+    """What the file says, the static transforms in it, and its text (empty: nominal)."""
 
+    file: CalibrationFile
     transforms: tuple[Transform, ...]
     text: str
 
@@ -51,18 +94,19 @@ class Calibration:
 def load_calibration(path: str) -> Calibration:
     """Read the calibration file; the nominal geometry when `path` is empty. ConfigError for a file that is wrong."""
     if not path:
-        return Calibration(_transforms(Frames()), "")
+        return Calibration(CalibrationFile(), _transforms(Frames()), "")
     file = Path(path).expanduser()
     if not file.exists():
         raise ConfigError(
             f"calibration: {file}: no such file; correct the key, or leave it empty for the nominal geometry"
         )
-    frames = toml_table.convert(toml_table.read(file), Frames, str(file))
-    for name, pose in msgspec.structs.asdict(frames).items():
+    found = toml_table.convert(toml_table.read(file), CalibrationFile, str(file))
+    for name in Frames.__struct_fields__:
+        pose: Pose = getattr(found, name)
         norm = sum(value * value for value in pose.rotation_xyzw)
         if abs(norm - 1) > 1e-3:
             raise ConfigError(f"{file}: {name}.rotation_xyzw: length {norm**0.5:.4f}, a unit quaternion is expected")
-    return Calibration(_transforms(frames), file.read_text())
+    return Calibration(found, _transforms(found), file.read_text())
 
 
 def _transforms(frames: Frames) -> tuple[Transform, ...]:
