@@ -1,0 +1,54 @@
+"""The trained network as an ONNX file in the layout of YOLOv8, with what it is for written inside."""
+
+from __future__ import annotations
+
+from datetime import date
+from pathlib import Path
+
+import onnx
+import torch
+
+from training.demo_detector.network import STRIDES, DemoDetector, Exported
+
+OPSET = 17
+CLASS_NAME = "tree-of-heaven"
+NOTE = (
+    "For demonstration only, not for the field: trained on pictures of a simulated forest and on nothing else. "
+    "What it says of a real forest means nothing."
+)
+
+
+def export(network: DemoDetector, input_px: tuple[int, int], path: Path) -> None:
+    """Write it with a fixed input of that height and width."""
+    height, width = input_px
+    path.parent.mkdir(parents=True, exist_ok=True)
+    torch.onnx.export(
+        Exported(network, height, width).eval(),
+        (torch.zeros(1, 3, height, width),),
+        str(path),
+        input_names=["images"],
+        output_names=["output0"],
+        opset_version=OPSET,
+        dynamo=False,
+    )
+    model = onnx.load(str(path))
+    onnx.helper.set_model_props(model, card(input_px))
+    onnx.checker.check_model(model, full_check=True)
+    onnx.save(model, str(path))
+
+
+def card(input_px: tuple[int, int]) -> dict[str, str]:
+    """The metadata: what Ultralytics' exporter writes, and a warning."""
+    return {
+        "description": f"Tree-of-Heaven in the simulated forest of mapforest. {NOTE}",
+        "author": "the mapforest developers",
+        "date": date.today().isoformat(),
+        "license": "Apache-2.0",
+        "version": "1",
+        "task": "detect",
+        "stride": str(max(STRIDES)),
+        "batch": "1",
+        "imgsz": str(list(input_px)),
+        "names": str({0: CLASS_NAME}),
+        "purpose": "demonstration only",
+    }
