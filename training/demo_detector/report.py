@@ -29,9 +29,9 @@ def _scenarios(tallies: dict[str, Tally], total: Tally) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, one in (*tallies.items(), ("**all**", total)):
-        rates = (one.precision, one.recall(), one.f1, one.average_precision)
+        rates = (one.precision, one.recall(), one.f1, one.ap50)
         seen = f"{one.windows_found} of {one.windows}"
-        cells = (name, str(one.pictures), str(one.trees), *(f"{rate:.3f}" for rate in rates), seen)
+        cells = (name, str(len(one.compared)), str(one.trees), *(f"{rate:.3f}" for rate in rates), seen)
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -47,5 +47,5 @@ def _ranges(total: Tally) -> str:
 def _mistakes(total: Tally) -> str:
     lines = [f"| wrong at {CONFIDENCE}: what stands there | detections | per 100 images |", "|---|---|---|"]
     for name, count in total.mistaken_for.most_common():
-        lines.append(f"| {name} | {count} | {100.0 * count / total.pictures:.2f} |")
+        lines.append(f"| {name} | {count} | {100.0 * count / len(total.compared):.2f} |")
     return "\n".join(lines)

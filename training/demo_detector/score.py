@@ -13,6 +13,7 @@ import numpy.typing as npt
 from drivers.sim.boxes import Annotation, TreeBoxes
 from drivers.sim.species import TRAITS, Species
 from pipeline.detection.detector import Detector, Settings
+from pipeline.evaluation.matching import average_precision, gather, match, overlaps
 from training.demo_detector.dataset import Picture, pictures
 
 CONFIDENCE, IOU = 0.35, 0.5
@@ -27,14 +28,13 @@ Doubles = npt.NDArray[np.float64]
 
 @dataclass
 class Tally:
-    """Counts over pictures. scored: confidence of every detection that counts, and whether it was right.
+    """Counts over pictures. compared: of each, the boxes that count, their confidences, and the true boxes.
 
     found_m, missed_m: ranges of the trees. mistaken_for: what stands where nothing was to be found. windows: see
     `WINDOW`.
     """
 
-    pictures: int = 0
-    scored: list[tuple[float, bool]] = field(default_factory=list)
+    compared: list[tuple[Doubles, Doubles, Doubles]] = field(default_factory=list)
     found_m: list[float] = field(default_factory=list)
     missed_m: list[float] = field(default_factory=list)
     mistaken_for: Counter[str] = field(default_factory=Counter)
@@ -70,13 +70,9 @@ class Tally:
         return found / max(1, found + missed)
 
     @property
-    def average_precision(self) -> float:
-        """Precision at 101 recalls, as COCO has it, at one IoU."""
-        right = np.array([right for _, right in sorted(self.scored, key=lambda one: -one[0])])
-        hits = np.cumsum(right)
-        best = np.maximum.accumulate((hits / np.arange(1, len(hits) + 1))[::-1])[::-1]
-        at = np.searchsorted(hits / max(1, self.trees), np.linspace(0.0, 1.0, 101))
-        return float(np.append(best, 0.0)[at].mean())
+    def ap50(self) -> float:
+        """Average precision at IoU 0.5, as COCO has it."""
+        return float(average_precision(gather(self.compared), levels=1)[0])
 
 
 def score(model: Path, walk: Path, rule: Annotation) -> Tally:
@@ -95,42 +91,22 @@ def _compared(detector: Detector, picture: Picture, rule: Annotation) -> tuple[T
     found = detector.detect(cv2.imread(str(picture.path)), 0)
     ours, counts = picture.boxes.species == Species.TREE_OF_HEAVEN, rule.counts(picture.boxes)
     wanted, left_open = picture.boxes[ours & counts], picture.boxes[ours & ~counts]
-    match = matched(found.boxes_px, wanted.boxes_px)
-    scored = (match >= 0) | (iou(found.boxes_px, left_open.boxes_px).max(axis=1, initial=0.0) < IOU)
-    sure = found.confidence >= CONFIDENCE
-    hit = np.isin(np.arange(len(wanted)), match[sure])
+    taken = match(overlaps(found.boxes_px, wanted.boxes_px), IOU)
+    beside = overlaps(found.boxes_px, left_open.boxes_px).max(axis=1, initial=0.0) >= IOU
+    scored, sure = (taken >= 0) | ~beside, found.confidence >= CONFIDENCE
+    hit = np.isin(np.arange(len(wanted)), taken[sure])
     tally = Tally(
-        pictures=1,
-        scored=list(zip(found.confidence[scored].tolist(), (match[scored] >= 0).tolist(), strict=True)),
+        compared=[(found.boxes_px[scored], found.confidence[scored], wanted.boxes_px)],
         found_m=wanted.range_m[hit].tolist(),
         missed_m=wanted.range_m[~hit].tolist(),
-        mistaken_for=Counter(_what(box, picture.boxes) for box in found.boxes_px[sure & scored & (match < 0)]),
+        mistaken_for=Counter(_what(box, picture.boxes) for box in found.boxes_px[sure & scored & (taken < 0)]),
     )
     return tally, set(wanted.tree[hit].tolist())
 
 
-def matched(boxes: Doubles, wanted: Doubles) -> npt.NDArray[np.int64]:
-    """(n,) row of the tree each box has, -1 for none: the surest box, which comes first, takes its best first."""
-    overlap = iou(boxes, wanted)
-    match = np.full(len(boxes), -1, np.int64)
-    for k in range(len(boxes)):
-        if overlap[k].max(initial=0.0) >= IOU:
-            match[k] = overlap[k].argmax()
-            overlap[:, match[k]] = 0.0
-    return match
-
-
-def iou(a: Doubles, b: Doubles) -> Doubles:
-    """(n, m) of all pairs of boxes (n, 4), (m, 4)."""
-    common = np.minimum(a[:, None, 2:], b[:, 2:]) - np.maximum(a[:, None, :2], b[:, :2])
-    common_area = np.clip(common, 0.0, None).prod(axis=2)
-    area_a, area_b = (np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (a, b))
-    return np.asarray(common_area / np.maximum(area_a[:, None] + area_b - common_area, 1e-9))
-
-
 def _what(box: Doubles, boxes: TreeBoxes) -> str:
     """What stands where a box is that should not be."""
-    overlap = iou(box[None], boxes.boxes_px)[0]
+    overlap = overlaps(box[None], boxes.boxes_px)[0]
     ours = boxes.species == Species.TREE_OF_HEAVEN
     if overlap[ours].max(initial=0.0) >= MISTAKEN_IOU:
         return "tree-of-heaven, box off"

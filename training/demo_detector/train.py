@@ -24,7 +24,7 @@ class Recipe:
     """input_px: height, width, multiples of 32. rate: the highest learning rate."""
 
     input_px: tuple[int, int] = (256, 416)
-    epochs: int = 30
+    epochs: int = 16
     batch: int = 16
     rate: float = 2e-3
     decay: float = 0.02
