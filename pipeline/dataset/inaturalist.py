@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from pipeline.dataset.errors import DatasetError
-from pipeline.dataset.licences import licence_code
+from pipeline.dataset.licences import licence_code, non_commercial
 
 _PHOTO_IN_URL = re.compile(r"/photos/(\d+)/")
 _NEEDED = ("id", "license", "image_url")
@@ -237,4 +237,6 @@ def as_record_fields(photo: Photo) -> dict[str, Any]:
         "licence": photo.licence,
         "attribution": photo.attribution,
         "url": photo.url,
+        "taxon": photo.taxon,
+        "non_commercial": non_commercial(photo.licence),
     }

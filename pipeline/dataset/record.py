@@ -42,6 +42,8 @@ class ImageRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     """distance or time."""
     group: str = ""
     """Images of one group belong together: an observation."""
+    taxon: str = ""
+    """What the observers say it is."""
     split: Split = ""
     licence: str = ""
     attribution: str = ""

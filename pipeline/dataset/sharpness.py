@@ -15,7 +15,7 @@ LONGEST_PX = 1024
 
 def sharpness(grey: npt.NDArray[np.uint8]) -> float:
     """Of a grey image (h, w), in squared grey values."""
-    return float(cv2.meanStdDev(cv2.Laplacian(_small(grey), cv2.CV_32F))[1][0, 0] ** 2)
+    return float(cv2.meanStdDev(cv2.Laplacian(_small(grey), cv2.CV_16S))[1][0, 0] ** 2)
 
 
 def _small(grey: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

@@ -1,0 +1,79 @@
+"""A dataset on the disk comes back as it was, also after a power cut, and others' YOLO folders are read."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from edge.dataset.folder import DatasetFolder
+from edge.errors import EdgeError, FormatError
+from tests.edge.dataset import scenes
+from tests.edge.dataset.scenes import BOX
+
+
+def test_records_classes_and_labels_come_back(tmp_path):
+    made = scenes.dataset(tmp_path / "d", 3, ("ailanthus", "sumac"), source="field", site="wood", stamp_ns=2**60 + 1)
+    scenes.label(made, p0=[BOX], p1=[])
+    again = DatasetFolder.open(tmp_path / "d")
+    assert again.records == made.records
+    assert again.classes == ["ailanthus", "sumac"]
+    assert again.boxes() == [(BOX,), (), None]
+    rows = list(csv.DictReader((tmp_path / "d" / "sites.csv").read_text().splitlines()))
+    assert rows[0] == {"image": "p0.png", "site": "wood", "source": "field", "session": "", "split": ""}
+
+
+def test_a_line_that_a_power_cut_tore_is_left_out_and_the_next_one_starts_anew(tmp_path):
+    made = scenes.dataset(tmp_path / "d", 3)
+    manifest = tmp_path / "d" / "manifest.jsonl"
+    manifest.write_bytes(manifest.read_bytes()[:-40])
+    again = DatasetFolder.make(tmp_path / "d")
+    assert again.records == made.records[:2]
+    again.add(made.records[2], scenes.png(2))
+    assert DatasetFolder.open(tmp_path / "d").records == made.records
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ('{"image": "a.png"}', "manifest.jsonl:1: .*sha256"),
+        ("nonsense", "manifest.jsonl:1"),
+        ('{"image": "../a.png", "sha256": "", "width_px": 1, "height_px": 1}', "not the name of a file"),
+        ('{"image": "a.png", "sha256": "", "width_px": 0, "height_px": 1}', "manifest.jsonl:1"),
+        ('{"image": "a.png", "sha256": "", "width_px": 1, "height_px": 1, "phash": "xyz"}', "phash"),
+    ],
+)
+def test_a_manifest_that_is_wrong_is_named_with_its_line(tmp_path, line, why):
+    scenes.dataset(tmp_path / "d", 1)
+    manifest = tmp_path / "d" / "manifest.jsonl"
+    manifest.write_text(line + "\n" + manifest.read_text())
+    with pytest.raises(FormatError, match=why):
+        DatasetFolder.open(tmp_path / "d")
+
+
+def test_a_yolo_folder_of_somebody_else_is_looked_at(tmp_path):
+    theirs = scenes.dataset(tmp_path / "d", 2)
+    scenes.label(theirs, p0=[BOX])
+    (tmp_path / "d" / "manifest.jsonl").unlink()
+    (tmp_path / "d" / "sites.csv").write_text("image,site\np0.png,wood\np1,moor\n")
+    found = DatasetFolder.open(tmp_path / "d")
+    assert [(r.image, r.site, r.source) for r in found.records] == [
+        ("p0.png", "wood", "other"), ("p1.png", "moor", "other")
+    ]  # fmt: skip
+    assert found.records[0].sha256 == theirs.records[0].sha256
+    assert found.boxes() == [(BOX,), None]
+
+
+def test_labels_that_are_no_boxes_are_named(tmp_path):
+    made = scenes.dataset(tmp_path / "d", 2)
+    made.label_path(made.records[1]).write_text("0 0.5 0.5 0.1 0.1\n1 0.5 0.5 0.1 0.1\n")
+    with pytest.raises(FormatError, match=r"labels/p1.txt:2: class 1, but classes.txt has 1 rows"):
+        made.boxes()
+
+
+def test_what_is_no_dataset_and_where_none_can_be_made_is_said(tmp_path):
+    with pytest.raises(FormatError, match="not a dataset"):
+        DatasetFolder.open(tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(EdgeError, match="--output"):
+        DatasetFolder.make(tmp_path / "file")
