@@ -40,10 +40,11 @@ def train(dataset: DatasetFolder, task: TrainingTask, trainer: Trainer) -> Model
     """Takes hours. UsageError for a dataset that is not ready, EdgeError when the trainer fails."""
     run = task.run.absolute()
     weights = run / "train" / "weights"
+    arguments = _arguments(run, weights / "last.pt", resume=task.resume)
     told = prepare(dataset, task)
     trainer.run(["settings", "sync=False"], run, run / LOG)  # it reports nothing to its makers
     if not (run / TRAINED).exists():
-        trainer.run(_arguments(run, weights / "last.pt", resume=task.resume), run, run / LOG)
+        trainer.run(arguments, run, run / LOG)
         _made(weights / "best.pt", run)
         (run / TRAINED).touch()
     trainer.run(export_arguments(weights / "best.pt", told), run, run / LOG)
@@ -57,7 +58,7 @@ def _arguments(run: Path, last: Path, *, resume: bool) -> list[str]:
     if not resume:
         return [f"cfg={run / RECIPE}"]
     if not last.exists():
-        raise UsageError(f"--resume: there is no {last}; leave it out to begin")
+        raise UsageError(f"--resume: there is no {last}; remove {run} if it is there, and begin without --resume")
     return ["train", "resume=True", f"model={last}"]
 
 
