@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +13,7 @@ from edge.dataset.folder import DatasetFolder, record_of
 from edge.dataset.image import ImageFacts, image_facts, image_files
 from edge.errors import FormatError
 from pipeline.dataset.errors import DatasetError
-from pipeline.dataset.hashes import NEAR_BITS, bits_apart
+from pipeline.dataset.hashes import HashIndex
 from pipeline.dataset.inaturalist import (
     Photo,
     as_record_fields,
@@ -22,6 +23,7 @@ from pipeline.dataset.inaturalist import (
     read_observations,
 )
 from pipeline.dataset.licences import non_commercial
+from pipeline.dataset.record import ImageRecord
 
 RESEARCH = "research"
 
@@ -96,10 +98,15 @@ class _Taking:
     dataset: DatasetFolder
     rules: PhotoRules
     report: PhotosReport = field(default_factory=PhotosReport)
+    digests: set[str] = field(default_factory=set)
+    hashes: HashIndex = field(default_factory=HashIndex)
+    groups: Counter[str] = field(default_factory=Counter)
 
     def run(self, files: Sequence[Path], advance: Callable[[float], None]) -> PhotosReport:
         report, groups, seen = self.report, observation_groups(self.photos.values()), set[str]()
         report.files = len(files)
+        for record in self.dataset.records:
+            self._know(record)
         for number, path in enumerate(files):
             advance(number / len(files))
             relative = str(path.relative_to(self.root))
@@ -126,7 +133,9 @@ class _Taking:
         if self._there(facts, photo):
             return
         name = f"inaturalist_{photo.observation_id}_{photo.photo_id}{path.suffix.lower()}"
-        self.dataset.add(record_of(name, facts, **as_record_fields(photo)), data)
+        record = record_of(name, facts, **as_record_fields(photo))
+        self.dataset.add(record, data)
+        self._know(record)
         self.report.added += 1
         self.report.obscured += photo.obscured
         self.report.licence_of_observation += not photo.own_licence
@@ -144,16 +153,18 @@ class _Taking:
 
     def _there(self, facts: ImageFacts, photo: Photo) -> bool:
         """Whether the dataset has the picture, or enough of its observation."""
-        group, own = f"inaturalist {photo.observation_id}", 0
-        for record in self.dataset.records:
-            if record.sha256 == facts.sha256:
-                self.report.already += 1
-                return True
-            if record.phash and bits_apart(record.phash, facts.phash) <= NEAR_BITS:
-                self.report.alike += 1
-                return True
-            own += record.group == group
-        if self.rules.most and own >= self.rules.most:
+        if facts.sha256 in self.digests:
+            self.report.already += 1
+            return True
+        if self.hashes.near(facts.phash):
+            self.report.alike += 1
+            return True
+        if self.rules.most and self.groups[f"inaturalist {photo.observation_id}"] >= self.rules.most:
             self.report.too_many += 1
             return True
         return False
+
+    def _know(self, record: ImageRecord) -> None:
+        self.digests.add(record.sha256)
+        self.hashes.add(record.phash)
+        self.groups[record.group] += 1

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.dataset.hashes import NEAR_BITS, bits_apart, perceptual_hash
+from pipeline.dataset.hashes import NEAR_BITS, HashIndex, perceptual_hash
 from pipeline.dataset.sharpness import sharpness
 
 Image = npt.NDArray[np.uint8]
@@ -58,14 +58,14 @@ def choose(
     known: hashes of images that are there already. Left out are images of which the hash is near to one of these, or
     to one chosen before, and those that are not sharp enough.
     """
-    hashes = list(known)
+    hashes = HashIndex(known, near_bits)
     for best in _sharpest(candidates, stretch, tally):
         if best.sharpness < least_sharpness:
             tally.blurred += 1
-        elif any(bits_apart(best.phash, other) <= near_bits for other in hashes):
+        elif hashes.near(best.phash):
             tally.alike += 1
         else:
-            hashes.append(best.phash)
+            hashes.add(best.phash)
             yield best
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import cv2
 import numpy as np
@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 NEAR_BITS = 4
 """Hashes that differ in at most so many bits are of one picture; unrelated ones differ in about 32."""
-_BITS = np.array([bin(octet).count("1") for octet in range(256)], np.uint8)
-_BLOCK = 512
 
 
 def perceptual_hash(grey: npt.NDArray[np.uint8]) -> str:
@@ -22,22 +20,44 @@ def perceptual_hash(grey: npt.NDArray[np.uint8]) -> str:
     return np.packbits(bits).tobytes().hex()
 
 
-def bits_apart(one: str, other: str) -> int:
-    """In how many of the 64 bits two hashes differ."""
-    return bin(int(one, 16) ^ int(other, 16)).count("1")
+class HashIndex:
+    """Hashes by the order they were added, to find the near ones among many.
+
+    Of bits + 1 parts of two near hashes one is the same in both, so only those with a part in common are compared.
+    """
+
+    def __init__(self, known: Iterable[str] = (), bits: int = NEAR_BITS) -> None:
+        self._bits = bits
+        self._width = -(-64 // (bits + 1))
+        self._words: list[int | None] = []
+        self._parts: list[dict[int, list[int]]] = [{} for _ in range(0, 64, self._width)]
+        for text in known:
+            self.add(text)
+
+    def add(self, text: str) -> None:
+        """The next one; "" takes a place and is near to none."""
+        word = int(text, 16) if text else None
+        if word is not None:
+            for part, places in zip(self._split(word), self._parts, strict=True):
+                places.setdefault(part, []).append(len(self._words))
+        self._words.append(word)
+
+    def near(self, text: str) -> list[int]:
+        """Places of those that are near, in order."""
+        if not text:
+            return []
+        word = int(text, 16)
+        parts = zip(self._split(word), self._parts, strict=True)
+        candidates = {place for part, places in parts for place in places.get(part, ())}
+        return sorted(p for p in candidates if bin(word ^ (self._words[p] or 0)).count("1") <= self._bits)
+
+    def _split(self, word: int) -> list[int]:
+        return [word >> shift & (1 << self._width) - 1 for shift in range(0, 64, self._width)]
 
 
-def near_pairs(hashes: Sequence[str], bits: int = NEAR_BITS) -> Iterator[tuple[int, int]]:
-    """Places i < j of images whose hashes are near; images without a hash ("") are near to none."""
-    known = np.array([place for place, text in enumerate(hashes) if text], np.int64)
-    if not len(known):
-        return
-    octets = np.array([list(bytes.fromhex(hashes[place])) for place in known], np.uint8)
-    for start in range(0, len(known), _BLOCK):
-        block = octets[start : start + _BLOCK]
-        apart = np.zeros((len(block), len(known) - start), np.uint8)
-        for column in range(octets.shape[1]):
-            apart += _BITS[block[:, column, None] ^ octets[None, start:, column]]
-        for i, j in np.argwhere(apart <= bits):
-            if i < j:
-                yield int(known[start + i]), int(known[start + j])
+def near_pairs(hashes: Iterable[str], bits: int = NEAR_BITS) -> Iterator[tuple[int, int]]:
+    """Places i < j of images whose hashes are near."""
+    index = HashIndex(bits=bits)
+    for j, text in enumerate(hashes):
+        yield from ((i, j) for i in index.near(text))
+        index.add(text)

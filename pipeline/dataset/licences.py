@@ -24,10 +24,5 @@ def non_commercial(code: str) -> bool:
     return "nc" in code.split("-")
 
 
-def no_derivatives(code: str) -> bool:
-    """Whether a licence forbids changed copies (a crop in a report is one)."""
-    return "nd" in code.split("-")
-
-
 def _version(part: str) -> bool:
     return part.replace(".", "").isdigit()

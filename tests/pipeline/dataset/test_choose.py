@@ -9,7 +9,7 @@ from scipy.fft import dctn
 from scipy.ndimage import laplace
 
 from pipeline.dataset.choose import Candidate, Tally, choose
-from pipeline.dataset.hashes import bits_apart, near_pairs, perceptual_hash
+from pipeline.dataset.hashes import near_pairs, perceptual_hash
 from pipeline.dataset.sharpness import LONGEST_PX, sharpness
 
 
@@ -19,6 +19,10 @@ def scene(seed: int, blur: float = 0.0) -> np.ndarray:
     image = sum(cv2.resize(rng.random((n, n)), (160, 120), interpolation=cv2.INTER_CUBIC) for n in (4, 8, 16, 64))
     image = cv2.normalize(image, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
     return cv2.GaussianBlur(image, (0, 0), blur) if blur else image
+
+
+def bits_apart(one: str, other: str) -> int:
+    return bin(int(one, 16) ^ int(other, 16)).count("1")
 
 
 def colour(grey: np.ndarray) -> np.ndarray:
