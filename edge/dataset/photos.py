@@ -101,6 +101,7 @@ class _Taking:
     digests: set[str] = field(default_factory=set)
     hashes: HashIndex = field(default_factory=HashIndex)
     groups: Counter[str] = field(default_factory=Counter)
+    added: set[str] = field(default_factory=set)
 
     def run(self, files: Sequence[Path], advance: Callable[[float], None]) -> PhotosReport:
         report, groups, seen = self.report, observation_groups(self.photos.values()), set[str]()
@@ -118,7 +119,7 @@ class _Taking:
                 self._take(path, photo)
         self.dataset.save()
         report.without_file = len(set(self.photos) - seen)
-        report.observations = len({record.group for record in self.dataset.records if record.source == "inaturalist"})
+        report.observations = len(self.added)
         return report
 
     def _take(self, path: Path, photo: Photo) -> None:
@@ -136,7 +137,9 @@ class _Taking:
         record = record_of(name, facts, **as_record_fields(photo))
         self.dataset.add(record, data)
         self._know(record)
+        self.added.add(record.group)
         self.report.added += 1
+        self.report.non_commercial += record.non_commercial
         self.report.obscured += photo.obscured
         self.report.licence_of_observation += not photo.own_licence
 
@@ -148,8 +151,10 @@ class _Taking:
         if photo.quality_grade not in ("", RESEARCH) and not rules.any_grade:
             report.other_grade += 1
             return False
-        report.non_commercial += non_commercial(photo.licence)
-        return not (rules.without_nc and non_commercial(photo.licence))
+        if rules.without_nc and non_commercial(photo.licence):
+            report.non_commercial += 1
+            return False
+        return True
 
     def _there(self, facts: ImageFacts, photo: Photo) -> bool:
         """Whether the dataset has the picture, or enough of its observation."""

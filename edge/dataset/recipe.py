@@ -54,14 +54,20 @@ def configuration(recipe: Recipe, run: Path, more: Sequence[str] = ()) -> dict[s
 
 
 def yaml_text(told: dict[str, Any]) -> str:
-    """Of a flat table: JSON's numbers, words and strings are YAML's."""
-    return "".join(f"{key}: {json.dumps(value, ensure_ascii=False)}\n" for key, value in told.items())
+    """Of a flat table: JSON's words and strings are YAML's."""
+    return "".join(f"{key}: {_scalar(value)}\n" for key, value in told.items())
 
 
 def export_arguments(weights: Path, recipe_told: dict[str, Any]) -> list[str]:
     """To a network with a fixed input, which is what TensorRT builds an engine for."""
     size = recipe_told["imgsz"]
     return ["export", f"model={weights}", "format=onnx", f"imgsz={size}", f"opset={OPSET}", "dynamic=False", "batch=1"]
+
+
+def _scalar(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    # 1e-05 is a text to YAML 1.1, 1.0e-05 is a number.
+    return text.replace("e", ".0e") if isinstance(value, float) and "e" in text and "." not in text else text
 
 
 def _value(text: str) -> Any:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import struct
 
+import cv2
 import pytest
 
 from edge.dataset.folder import DatasetFolder
+from edge.dataset.image import image_facts
 from edge.errors import EdgeError, FormatError
 from tests.edge.dataset import scenes
 from tests.edge.dataset.scenes import BOX
@@ -77,3 +80,18 @@ def test_what_is_no_dataset_and_where_none_can_be_made_is_said(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(EdgeError, match="--output"):
         DatasetFolder.make(tmp_path / "file")
+
+
+@pytest.mark.parametrize(("orientation", "size"), [(1, (96, 64)), (6, (64, 96))])
+def test_a_photo_has_the_size_it_is_shown_with(orientation, size):
+    jpeg = cv2.imencode(".jpg", scenes.picture(1))[1].tobytes()
+    exif = b"Exif\0\0MM\0*" + struct.pack(">IHHHIHHI", 8, 1, 0x0112, 3, 1, orientation, 0, 0)
+    turned = jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + jpeg[2:]
+    facts = image_facts(turned, "photo")
+    assert (facts.width_px, facts.height_px) == size
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff", b"GIF89a"])
+def test_what_is_no_image_is_an_error(data):
+    with pytest.raises(FormatError, match=r"a\.jpg: not an image"):
+        image_facts(data, "a.jpg")

@@ -66,11 +66,12 @@ def test_reserved_photos_and_other_grades_stay_out_and_nc_does_on_request(tmp_pa
         observation(503, {9004: "cc-by", 9005: "cc-by"}),
     )
     report, made = take(tmp_path / "a", given)
-    assert (report.reserved, report.other_grade, report.non_commercial) == (1, 1, 1)
+    assert (report.reserved, report.other_grade, report.non_commercial, report.observations) == (1, 1, 1, 2)
     assert {record.image for record in made.records} == {"inaturalist_501_9002.png", "inaturalist_503_9004.png"}
     assert report.without_file == 1
     report, made = take(tmp_path / "b", given, without_nc=True, any_grade=True)
     assert sorted(record.licence for record in made.records) == ["cc-by", "cc-by"]
+    assert report.non_commercial == 1
 
 
 def test_the_same_picture_comes_in_once_the_larger_of_two(tmp_path):

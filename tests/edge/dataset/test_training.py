@@ -10,17 +10,19 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from ruamel.yaml import YAML
 
 from edge.cli import exit_codes
 from edge.cli.main import main
 from edge.dataset.card import data_facts, read_metrics
 from edge.dataset.folder import DatasetFolder
+from edge.dataset.recipe import yaml_text
 from edge.dataset.trainer import find_trainer
 from edge.errors import EdgeError, FormatError, UsageError
 from tests.edge.dataset import scenes
 from tests.edge.dataset.scenes import BOX
 
-YOLO = """#!{python}
+PROGRAM = """#!{python}
 # Keeps what it was told, and leaves the files the real one leaves.
 import json, os, sys
 from pathlib import Path
@@ -69,7 +71,7 @@ def trainer(tmp_path):
     """The folder of an environment with the stand-in."""
     binaries = tmp_path / "environment" / "bin"
     binaries.mkdir(parents=True)
-    program(binaries / "yolo", YOLO)
+    program(binaries / "yolo", PROGRAM)
     program(binaries / "python", PYTHON)
     (binaries / "described.json").write_text(json.dumps(DESCRIBED).replace("\n", ""))
     return tmp_path / "environment"
@@ -252,6 +254,13 @@ def test_a_dataset_that_is_not_ready_is_refused(trees, trainer, tmp_path, capsys
 @pytest.mark.parametrize("words", [["--size", "830"], ["--epochs", "0"], ["--set", "patience"]])
 def test_options_that_make_no_sense_are_refused(trees, trainer, tmp_path, words):
     assert train(trees, trainer, tmp_path / "run", *words) == exit_codes.USAGE
+
+
+@pytest.mark.parametrize("value", [1e-05, 0.001, 2.5e-07, 1e16, True, 3, "a: b", "ü"])
+def test_values_are_yaml(value):
+    yaml = YAML(typ="safe", pure=True)
+    yaml.version = (1, 1)  # as the trainer reads it
+    assert yaml.load(yaml_text({"key": value})) == {"key": value}
 
 
 def test_a_dry_run_writes_what_would_be_used_and_starts_nothing(trees, tmp_path, monkeypatch, capsys):
