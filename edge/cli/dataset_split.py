@@ -80,14 +80,15 @@ def _split(args: argparse.Namespace) -> int:
         "loose": division.loose,
     }
     parts = ", ".join(f"{name} {images[name]} images {per_split[name]} boxes" for name in SPLITS)
+    empty = [name for name, share in zip(SPLITS, rules.shares, strict=True) if share > 0 and not images[name]]
     lines = [
         f"{args.dataset}: {parts}; {division.blocks} blocks, seed {args.seed}",
+        f"  nothing is left for {', '.join(empty)}: walk more, or make --block or --gap smaller" if empty else "",
         some(division.set_aside, "images set aside, within the gap of another split"),
         some(division.loose, "images with neither place nor time: what they are near to is not known"),
         *(some(count, f"leaks, pairs in different splits but {words}") for words, count in kinds.items()),
     ]
     tell(args, told, lines)
-    empty = [name for name, share in zip(SPLITS, rules.shares, strict=True) if share > 0 and not images[name]]
     return exit_codes.WARNINGS if division.leaks or empty else exit_codes.GOOD
 
 

@@ -155,7 +155,7 @@ def _read_manifest(path: Path) -> list[ImageRecord]:
         try:
             record = msgspec.json.decode(line, type=ImageRecord)
         except msgspec.MsgspecError as error:
-            if number == len(lines):  # the power went while it was written; its image is found again
+            if number == len(lines):  # the power went while it was written: the same step adds the image again
                 break
             raise FormatError(f"{path}:{number}: {error}") from error
         if "/" in record.image or record.image in ("", ".", ".."):

@@ -1,27 +1,25 @@
 """A dataset in training, validation and test, so that no image of one is a neighbour of an image of another.
 
-Blocks of place or time go into a split as a whole, the best of some seeded draws; what lies within the gap of another
-split is set aside, from training first, from the test never.
+Blocks of place or time go into a split as a whole (`draw.py`); what lies within the gap of another split is set aside,
+from training first, from the test never.
 """
 
 from __future__ import annotations
 
-import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
+import numpy as np
 
 from pipeline.dataset.blocks import BlockSize, By, find_blocks
+from pipeline.dataset.draw import APART, FREE, Lottery, code_of, numbered
 from pipeline.dataset.errors import SplitRefused
 from pipeline.dataset.neighbours import Gap, Pair, leaks, near
 from pipeline.dataset.record import GAP, SPLITS, ImageRecord, Split
 
-DRAWS = 64
 _UNLABELLED = 0.01
 """Weight of an image nobody has looked at: it is placed, but does not count."""
-_EMPTY = 100.0
-_LEAST_ODDS = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +60,8 @@ def divide(records: Sequence[ImageRecord], boxes: Sequence[int | None], rules: R
     blocks = find_blocks(records, rules.by, rules.size)
     bound = [_bound([records[place] for place in block], rules) for block in blocks]
     _check_enough(bound, rules)
-    splits: list[Split] = [""] * len(records)
-    for block, split in zip(blocks, _best(records, boxes, blocks, bound, rules), strict=True):
-        for place in block:
-            own = records[place].split
-            splits[place] = own if rules.keep and own in SPLITS else split
-    if not rules.force:
-        _set_aside(records, splits, rules.gap)
+    codes = _lottery(records, boxes, blocks, bound, rules).best(rules.seed)
+    splits: list[Split] = [GAP if code == APART else SPLITS[code] for code in codes.tolist()]
     divided = [msgspec.structs.replace(record, split=split) for record, split in zip(records, splits, strict=True)]
     return Division(
         records=divided,
@@ -89,75 +82,27 @@ def _bound(block: Sequence[ImageRecord], rules: Rules) -> Split:
     return "train" if any(record.source in rules.train_only for record in block) else ""
 
 
-def _best(
+def _lottery(
     records: Sequence[ImageRecord],
     boxes: Sequence[int | None],
     blocks: Sequence[Sequence[int]],
-    bound: list[Split],
+    bound: Sequence[Split],
     rules: Rules,
-) -> list[Split]:
-    weights = [sum(_UNLABELLED if boxes[place] is None else 1.0 + (boxes[place] or 0) for place in b) for b in blocks]
-    draw = _Draw(weights, [records[block[0]].source for block in blocks], bound, _wanted(rules))
-    dice = random.Random(rules.seed)
-    return min((draw.draw(dice) for _ in range(DRAWS)), key=draw.unfair)
-
-
-@dataclass(frozen=True, slots=True)
-class _Draw:
-    """What is drawn from: weight, source and, where it is not free, split of each block."""
-
-    weights: list[float]
-    sources: list[str]
-    bound: list[Split]
-    shares: dict[Split, float]
-
-    def totals(self) -> dict[str, float]:
-        """Weight of each source."""
-        found = dict.fromkeys(self.sources, 0.0)
-        for source, weight in zip(self.sources, self.weights, strict=True):
-            found[source] += weight
-        return found
-
-    def draw(self, dice: random.Random) -> list[Split]:
-        """Blocks in any order, each with good odds where much of its source is lacking."""
-        totals, splits = self.totals(), list(self.bound)
-        lacking = {(source, split): share * totals[source] for source in totals for split, share in self.shares.items()}
-        for source, split, weight in zip(self.sources, splits, self.weights, strict=True):
-            if split in self.shares:
-                lacking[source, split] -= weight
-        free = [place for place, split in enumerate(splits) if not split]
-        dice.shuffle(free)
-        wanted = list(self.shares)
-        for place in free:
-            source = self.sources[place]
-            odds = [max(lacking[source, split], _LEAST_ODDS * totals[source]) for split in wanted]
-            splits[place] = dice.choices(wanted, odds)[0]
-            lacking[source, splits[place]] -= self.weights[place]
-        return splits
-
-    def unfair(self, splits: Sequence[Split]) -> float:
-        """How far from the shares asked for, in each source; a split without anything is worst."""
-        totals = self.totals()
-        have = {(source, split): 0.0 for source in totals for split in SPLITS}
-        for source, split, weight in zip(self.sources, splits, self.weights, strict=True):
-            have[source, split] += weight
-        off = sum(
-            totals[source] * (have[source, split] / totals[source] - share) ** 2 / share
-            for source in totals
-            for split, share in self.shares.items()
-        )
-        missing = sum(1 for split in self.shares if split not in splits)
-        return off / sum(totals.values()) + _EMPTY * missing
-
-
-def _set_aside(records: Sequence[ImageRecord], splits: list[Split], gap: Gap) -> None:
-    """Of two neighbours in different splits the one of training goes first, then the one of validation."""
-    crossing = [pair for pair in near(records, gap) if splits[pair.i] != splits[pair.j]]
-    for winner in ("test", "val"):
-        for pair in crossing:
-            for one, other in ((pair.i, pair.j), (pair.j, pair.i)):
-                if splits[one] == winner and splits[other] in SPLITS and splits[other] != winner:
-                    splits[other] = GAP
+) -> Lottery:
+    block = np.zeros(len(records), np.int64)
+    for number, members in enumerate(blocks):
+        block[members] = number
+    kept = [code_of(record.split) if rules.keep else FREE for record in records]
+    pairs = [] if rules.force else [(pair.i, pair.j) for pair in near(records, rules.gap)]
+    return Lottery(
+        block=block,
+        source=numbered([record.source for record in records]),
+        weight=np.array([_UNLABELLED if count is None else 1.0 + count for count in boxes]),
+        kept=np.array(kept, np.int64),
+        bound=np.array([code_of(split) for split in bound], np.int64),
+        pairs=np.array(pairs, np.int64).reshape(-1, 2),
+        shares=np.array(rules.shares),
+    )
 
 
 def _check_sites(records: Sequence[ImageRecord], rules: Rules) -> None:
@@ -168,7 +113,7 @@ def _check_sites(records: Sequence[ImageRecord], rules: Rules) -> None:
 
 
 def _check_enough(bound: Sequence[Split], rules: Rules) -> None:
-    needed = set(_wanted(rules)) - set(bound)
+    needed = {split for split, share in zip(SPLITS, rules.shares, strict=True) if share > 0} - set(bound)
     free = sum(1 for split in bound if not split)
     if free < len(needed):
         what = {"site": "sites", "block": "blocks", "image": "images"}[rules.by]
@@ -176,8 +121,3 @@ def _check_enough(bound: Sequence[Split], rules: Rules) -> None:
             f"{free} {what} cannot be shared among {len(needed)} splits; make the blocks smaller (--block), walk more, "
             "or divide single images (--by image --force) and see what leaks"
         )
-
-
-def _wanted(rules: Rules) -> dict[Split, float]:
-    """The splits that are to get something, and how much."""
-    return {split: share for split, share in zip(SPLITS, rules.shares, strict=True) if share > 0}

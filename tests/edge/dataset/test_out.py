@@ -138,6 +138,13 @@ def test_too_small_a_dataset_is_refused_with_what_to_do(tmp_path, capsys):
     assert "--block" in told
 
 
+def test_a_split_for_which_nothing_is_left_is_said(tmp_path, capsys):
+    spread(tmp_path / "trees", 12, metres=20.0)
+    code, told = run(capsys, "split", tmp_path / "trees", "--gap", "500")
+    assert code == exit_codes.WARNINGS
+    assert "nothing is left for" in told
+
+
 def test_statistics_are_shown(tmp_path, capsys):
     spread(tmp_path / "trees")
     code, told = run(capsys, "statistics", tmp_path / "trees")

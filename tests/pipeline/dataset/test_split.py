@@ -115,6 +115,13 @@ def test_an_observation_and_pictures_that_are_alike_stay_together():
     assert division.leaks == []
 
 
+def test_of_many_draws_the_one_that_loses_least_is_taken():
+    small = divide(line(100), [1] * 100, Rules(shares=(0.6, 0.2, 0.2)))
+    counts = [splits(small).count(name) for name in ("train", "val", "test")]
+    assert min(counts) > 0
+    assert small.set_aside <= 40  # at most two borders of 20 m, each ten images wide
+
+
 def test_without_positions_a_session_is_divided_in_time():
     records = [image(f"t{k}", session="walk", stamp_ns=k * S) for k in range(1000)]
     division = divide(records, [1] * 1000, Rules())
