@@ -120,11 +120,11 @@ def read_text(path: Path) -> str:
 
 
 def sites_csv(records: Iterable[ImageRecord]) -> str:
-    """With a heading."""
+    """With a heading. Images of no site have their source for one, so that it is told apart."""
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")
     rows.writerow(SITES_COLUMNS)
-    rows.writerows([getattr(record, column) for column in SITES_COLUMNS] for record in records)
+    rows.writerows((r.image, r.site or r.source, r.source, r.session, r.split) for r in records)
     return out.getvalue()
 
 
@@ -168,8 +168,7 @@ def _look(folder: Path) -> list[ImageRecord]:
     """Records of images that came without a manifest; the site from sites.csv, where that is."""
     sites: dict[str, str] = {}
     if (folder / SITES).exists():
-        rows = csv.DictReader(io.StringIO(read_text(folder / SITES)))
-        sites = {row.get("image") or "": row.get("site") or "" for row in rows}
+        sites = {row[0]: row[1] for row in csv.reader(io.StringIO(read_text(folder / SITES))) if len(row) > 1}
     records = []
     for path in sorted((folder / IMAGES).iterdir()):
         if path.suffix.lower() in ENDINGS:

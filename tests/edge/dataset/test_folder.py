@@ -54,11 +54,18 @@ def test_a_manifest_that_is_wrong_is_named_with_its_line(tmp_path, line, why):
         DatasetFolder.open(tmp_path / "d")
 
 
-def test_a_yolo_folder_of_somebody_else_is_looked_at(tmp_path):
+def test_images_of_no_site_are_told_apart_by_their_source(tmp_path):
+    scenes.dataset(tmp_path / "d", 1, source="inaturalist")
+    rows = list(csv.DictReader((tmp_path / "d" / "sites.csv").read_text().splitlines()))
+    assert rows[0]["site"] == "inaturalist"
+
+
+@pytest.mark.parametrize("heading", ["", "image,site\n"])
+def test_a_yolo_folder_of_somebody_else_is_looked_at(tmp_path, heading):
     theirs = scenes.dataset(tmp_path / "d", 2)
     scenes.label(theirs, p0=[BOX])
     (tmp_path / "d" / "manifest.jsonl").unlink()
-    (tmp_path / "d" / "sites.csv").write_text("image,site\np0.png,wood\np1,moor\n")
+    (tmp_path / "d" / "sites.csv").write_text(f"{heading}p0.png,wood\np1,moor\n")
     found = DatasetFolder.open(tmp_path / "d")
     assert [(r.image, r.site, r.source) for r in found.records] == [
         ("p0.png", "wood", "other"), ("p1.png", "moor", "other")
