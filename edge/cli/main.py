@@ -15,6 +15,7 @@ from drivers.errors import DriverError
 from edge import __version__
 from edge.cli import exit_codes
 from edge.errors import EdgeError, UsageError
+from pipeline.detection.errors import DetectionError
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("edge.cli.demo", "the whole mission on the emulated payload"),
@@ -125,7 +126,7 @@ def _run(command: Command, options: argparse.Namespace) -> int:
     except UsageError as error:
         print(f"mapforest: {error}", file=sys.stderr)
         return exit_codes.USAGE
-    except (EdgeError, DriverError) as error:
+    except (EdgeError, DriverError, DetectionError) as error:
         print(f"mapforest: {error}", file=sys.stderr)
         return exit_codes.FAILED
     except KeyboardInterrupt:
