@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 Colour = tuple[int, int, int]
 MOST = 12
 COLUMNS = 3
-TILE_PX = (400, 560)
+TILE_PX = (320, 560)
 """Height and width of the picture in a tile."""
 _WORDS_PX = 26
 _GAP_PX = 8
