@@ -113,7 +113,8 @@ class LazyDecoder:
                 break
         return frames
 
-    def _decoded(self, packet: av.Packet[Any] | None) -> list[Frame]:
+    def _decoded(self, packet: Any) -> list[Frame]:
+        """packet: an `av.Packet`, None at the end."""
         try:
             found = self._codec.decode(packet)
         except av.error.FFmpegError:
