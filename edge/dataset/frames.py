@@ -13,12 +13,13 @@ import msgspec
 from edge.config import Config
 from edge.dataset.folder import DatasetFolder
 from edge.dataset.image import digest
-from edge.dataset.video import VideoTally, read_frames, video_topic
 from edge.dataset.way import NoWay, Way, find_way
 from edge.errors import EdgeError, FormatError
 from edge.process.process import Task
 from edge.recording.folder import safe_name
+from edge.replay.frames import VideoFrames, video_topic
 from edge.replay.store import MessageStore
+from edge.ros import schemas
 from pipeline.dataset.choose import Candidate, Chosen, Tally, choose
 from pipeline.dataset.record import ImageRecord
 
@@ -101,15 +102,19 @@ class _Extraction:
         return report
 
     def _candidates(self, advance: Callable[[float], None]) -> Iterator[Candidate]:
-        topic = video_topic(self.store, self.store.recording.effective(self.config).topics)
-        count, tally = max(self.store.count(topic), 1), VideoTally()
+        topic = video_topic(self.store.topics, self.store.recording.effective(self.config).topics)
+        count = self.store.count(topic) if topic else 0
+        if not count:
+            raise FormatError(f"{self.store.recording.name}: no video in this recording: {_why_not(topic)}")
+        frames = VideoFrames(self.store, topic)
         start_ns: int | None = None
-        for stamp_ns, image in read_frames(self.store, topic, self._wanted, tally):
-            advance(tally.units / count)
+        for frame in frames.read(self._wanted):
+            stamp_ns = frame.stamp_ns
+            advance(frames.tally.units / count)
             start_ns = stamp_ns if start_ns is None else start_ns
             along = self.way.along_m(stamp_ns) if isinstance(self.way, Way) else (stamp_ns - start_ns) / 1e9
-            yield Candidate(stamp_ns, along, image)
-        self.report.lost = tally.lost
+            yield Candidate(stamp_ns, along, frame.image_bgr)
+        self.report.lost = frames.tally.orphans + frames.tally.damaged + frames.unreadable
 
     def _wanted(self, stamp_ns: int) -> bool:
         if isinstance(self.way, NoWay) or self.way.covers(stamp_ns):
@@ -146,6 +151,10 @@ class _Extraction:
         self.dataset.add(record, data)
         self.report.added += 1
         self.report.placed += place is not None
+
+
+def _why_not(topic: str) -> str:
+    return "the camera gave none" if topic else f"there is no topic of type {schemas.COMPRESSED_VIDEO}"
 
 
 def _name(session: str, stamp_ns: int) -> str:
