@@ -1,0 +1,1 @@
+"""`mapforest process` over long recordings."""
