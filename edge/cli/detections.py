@@ -14,7 +14,7 @@ from rich.table import Table
 from edge.cli import exit_codes
 from edge.cli.stage_bar import StageBar
 from edge.cli.words import console
-from edge.config import load
+from edge.config import Detection, load
 from edge.errors import EdgeError, UsageError
 from pipeline.evaluation.errors import EvaluationError
 
@@ -30,12 +30,12 @@ def run(args: argparse.Namespace) -> int:
 
     if args.dataset is None:
         raise UsageError("evaluate detection: a dataset is missing: `mapforest evaluate detection MODEL DATASET`")
-    config = load(args.config)
-    confidence = config.detection.confidence if args.confidence is None else args.confidence
+    settings = load(args.config).detection
     try:
         dataset = read_dataset(args.dataset)
-        found, names = _found(args, dataset)
-        evaluated = evaluate(dataset, found, names, confidence)
+        found, names, advised = _found(args, settings, dataset)
+        asked = settings.confidence or advised if args.confidence is None else args.confidence
+        evaluated = evaluate(dataset, found, names, asked)
         written = _write(args, evaluated)
     except EvaluationError as error:
         raise EdgeError(str(error)) from error
@@ -86,17 +86,20 @@ def _table(what: str, rows: dict[str, Figures], report: DetectionReport) -> Tabl
     return table
 
 
-def _found(args: argparse.Namespace, dataset: Dataset) -> tuple[dict[str, Boxes], tuple[str, ...]]:
+def _found(
+    args: argparse.Namespace, settings: Detection, dataset: Dataset
+) -> tuple[dict[str, Boxes], tuple[str, ...], float]:
+    """By image, names of the classes, and the confidence of the operating point unless another is asked for."""
     from edge.detection import DEMO, open_detector
+    from pipeline.detection.detector import CONFIDENCE
     from pipeline.evaluation.predictions import UNSURE, predict, read_predictions
 
     if str(args.estimate) != DEMO and args.estimate.is_dir():
-        return read_predictions(args.estimate, dataset)
-    settings = msgspec.structs.replace(load(args.config).detection, model=str(args.estimate))
-    detector = open_detector(settings, confidence=UNSURE)
+        return *read_predictions(args.estimate, dataset), CONFIDENCE
+    detector = open_detector(msgspec.structs.replace(settings, model=str(args.estimate)), confidence=UNSURE)
     with StageBar(quiet=args.json) as bar:
         bar.stage("detection", done=False)
-        return predict(dataset, detector, bar.advance), detector.info.class_names
+        return predict(dataset, detector, bar.advance), detector.info.class_names, detector.info.advised
 
 
 def _write(args: argparse.Namespace, evaluated: Evaluated) -> dict[Path, str]:

@@ -56,7 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--page", type=Path, metavar="FILE", help="also write plots, as one HTML page (not of clocks)")
     parser.add_argument("--worst", type=Path, metavar="FILE", help="detection: the worst images in one JPEG or PNG")
     parser.add_argument(
-        "--confidence", type=float, metavar="C", help="detection: of the operating point (detection.confidence)"
+        "--confidence",
+        type=float,
+        metavar="C",
+        help="detection: of the operating point (detection.confidence, else what the model advises)",
     )
 
 

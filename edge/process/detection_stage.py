@@ -68,7 +68,7 @@ class DetectionStage:
             info.sha256,
             info.class_names,
             info.device,
-            settings.confidence,
+            self.detector.confidence,
             settings.iou,
             info.demonstration,
         )

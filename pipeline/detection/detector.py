@@ -29,13 +29,14 @@ _SLACK = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """confidence: least score. iou: boxes of a class that overlap by more are one. most: boxes of an image.
+    """confidence: least score; 0: what the model advises, else `CONFIDENCE`. iou: boxes of a class that overlap by more
+    are one. most: boxes of an image.
 
     input_px: longer side of the input, where the model leaves it open. threads: 0 for as many as there are cores.
     cache: for what TensorRT builds.
     """
 
-    confidence: float = CONFIDENCE
+    confidence: float = 0.0
     iou: float = IOU
     most: int = 300
     input_px: int = OPEN_INPUT_PX
@@ -46,7 +47,10 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class ModelInfo:
-    """What results are labelled with. device: that it runs on. input_px: height, width; None where it is open."""
+    """What results are labelled with. device: that it runs on. input_px: height, width; None where it is open.
+
+    advised: least score, of its maker, else `CONFIDENCE`.
+    """
 
     name: str
     sha256: str
@@ -55,6 +59,7 @@ class ModelInfo:
     layout: Layout
     input_px: tuple[int, int] | None
     demonstration: bool
+    advised: float = CONFIDENCE
 
     @property
     def notice(self) -> str:
@@ -83,8 +88,17 @@ class Detector:
             raise ModelForeign(f"{path}: {error}") from error
         names = card.names or tuple(f"class {index}" for index in range(classes))
         self.info = ModelInfo(
-            path.stem, digest, names, self._session.device, layout, self._input_px, card.demonstration
+            path.stem,
+            digest,
+            names,
+            self._session.device,
+            layout,
+            self._input_px,
+            card.demonstration,
+            card.confidence or CONFIDENCE,
         )
+        self.confidence = self._settings.confidence or self.info.advised
+        """Least score."""
 
     def detect(self, image_bgr: Image, stamp_ns: int) -> FrameDetections:
         """image_bgr: (height, width, 3) uint8. InferenceFailed, DetectionError for what is no image."""
@@ -93,7 +107,7 @@ class Detector:
         height, width, _ = image_bgr.shape
         box = self._letterbox((height, width))
         where = box.put(image_bgr)
-        found = decode(self._run(box.blob), self.info.layout, self._settings.confidence)
+        found = decode(self._run(box.blob), self.info.layout, self.confidence)
         if len(found.boxes):
             found = self._finished(found, where)
         return FrameDetections(

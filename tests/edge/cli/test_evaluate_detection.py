@@ -61,6 +61,15 @@ def test_the_confidence_of_the_operating_point_can_be_moved(dataset, model, caps
     assert json.loads(capsys.readouterr().out)["overall"]["found"] == 0
 
 
+def test_the_operating_point_is_the_one_that_the_model_advises(dataset, tmp_path, capsys):
+    pytest.importorskip("onnxruntime", reason="the detector's runtime is an extra")
+    pytest.importorskip("onnx", reason="models for tests are built with onnx")
+    spotter = importlib.import_module("tests.pipeline.detection.models").spotter
+    told = spotter(tmp_path / "told.onnx", (96, 160), NAMES, confidence=0.9)
+    assert main(["evaluate", "detection", str(told), str(dataset), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["confidence"] == 0.9
+
+
 def test_what_another_program_found_is_judged_alike(dataset, tmp_path, capsys):
     (tmp_path / "runs" / "here").mkdir(parents=True)
     (tmp_path / "runs" / "here" / "a.txt").write_text("0 0.3 0.5 0.2 0.34 0.8\n")

@@ -92,6 +92,15 @@ def test_confidence_and_overlap_are_settings(tmp_path):
     assert len(Detector(path, Settings(confidence=0.1, iou=0.95, most=1)).detect(picture(96, 192), 5)) == 1
 
 
+def test_the_least_confidence_is_the_one_asked_for_or_the_models_or_the_default(tmp_path):
+    output = said((30, 28, 20, 10, 0.9, 0), (60, 30, 10, 10, 0.3, 0), (80, 30, 10, 10, 0.2, 0))
+    plain = models.constant(tmp_path / "plain.onnx", output, names="{0: 'a'}")
+    advised = models.constant(tmp_path / "advised.onnx", output, names="{0: 'a'}", confidence="0.25")
+    for path, asked, least, count in [(plain, 0.0, 0.35, 1), (advised, 0.0, 0.25, 2), (advised, 0.1, 0.1, 3)]:
+        detector = Detector(path, Settings(confidence=asked))
+        assert (detector.confidence, len(detector.detect(picture(96, 192), 5))) == (least, count)
+
+
 def test_an_open_input_takes_the_size_of_its_metadata_or_the_default(tmp_path):
     shape = (1, 3, "height", "width")
     path = models.constant(tmp_path / "m.onnx", said(), shape=shape, names="{0: 'a'}", imgsz="[640, 640]")
@@ -170,6 +179,7 @@ def test_a_truncated_file_is_refused_wherever_it_ends(tmp_path):
         (yolov5(), {}, "not those of 1 x N x 6; export a model of YOLOv8 or later"),
         (np.full((1, 50, 6), 7.0, np.float32), {}, "not between 0 and 1"),
         (said() * np.nan, {}, "not between 0 and 1"),
+        (said(), {"confidence": "1.5"}, "'confidence' is '1.5', expected a score above 0"),
         (said(), {"task": "pose"}, "task is 'pose'"),
         (said(), {"names": "{0: 'a', 1: 'b'}"}, "1 x 5 x 200 for 2 classes"),
     ],
