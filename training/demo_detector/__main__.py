@@ -1,9 +1,11 @@
 """The demonstration detector from nothing to the file in the repository, step by step.
 
-python -m training.demo_detector render FOLDER          film walks to train on and to be measured on
-python -m training.demo_detector train FOLDER RUN       goes on where it was stopped
-python -m training.demo_detector export RUN MODEL
-python -m training.demo_detector score FOLDER MODEL     the tables of the model card
+python -m training.demo_detector render FOLDER              film walks to train on and to be measured on
+python -m training.demo_detector train FOLDER RUN           goes on where it was stopped
+python -m training.demo_detector export RUN MODEL CONFIDENCE
+python -m training.demo_detector score FOLDER MODEL         the tables of the model card
+
+CONFIDENCE is the least that the model will advise: export, score, and choose it from the table.
 """
 
 from __future__ import annotations
@@ -27,13 +29,13 @@ def main() -> None:
     for step, names in (
         (render, ("folder",)),
         (train, ("folder", "run")),
-        (export, ("run", "model")),
+        (export, ("run", "model", "confidence")),
         (score, ("folder", "model")),
     ):
         one = steps.add_parser(step.__name__, help=step.__doc__)
         one.set_defaults(step=step)
         for name in names:
-            one.add_argument(name, type=Path)
+            one.add_argument(name, type=float if name == "confidence" else Path)
     options = vars(parser.parse_args())
     options.pop("step")(**options)
 
@@ -56,12 +58,12 @@ def train(folder: Path, run: Path) -> None:
     training.train([one for walk in walks for one in dataset.pictures(walk)], training.Recipe(), run)
 
 
-def export(run: Path, model: Path) -> None:
-    """Write the trained network as ONNX."""
+def export(run: Path, model: Path, confidence: float) -> None:
+    """Write the trained network as ONNX, and the least confidence it advises inside."""
     from training.demo_detector.export import export as write
     from training.demo_detector.train import Recipe, trained
 
-    write(trained(run), Recipe().input_px, model)
+    write(trained(run), Recipe().input_px, confidence, model)
 
 
 def score(folder: Path, model: Path) -> None:

@@ -13,9 +13,9 @@ import torch
 from torch import Tensor
 
 from drivers.sim.boxes import Annotation
+from pipeline.detection.letterbox import PAD, fit
 from training.demo_detector.dataset import Picture
 
-PAD = 114
 LEAST_LEFT = 0.3
 """Share of a box that a crop must leave for it to count."""
 SEES_NOTHING_PX = 20
@@ -45,11 +45,10 @@ class Batch:
 def shrunk(picture: Picture, rule: Annotation, input_px: tuple[int, int]) -> Small:
     """Read from disk and resized, as the letterbox at run time does it, without the grey around."""
     image = cv2.cvtColor(cv2.imread(str(picture.path)), cv2.COLOR_BGR2RGB)
-    height, width = image.shape[:2]
-    scale = min(input_px[0] / height, input_px[1] / width)
-    size = (round(width * scale), round(height * scale))
-    factor = np.array([size[0] / width, size[1] / height] * 2, np.float32)
-    small = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
+    image_px = (image.shape[0], image.shape[1])
+    height, width = fit(image_px, input_px).inner_px
+    factor = np.array([width / image_px[1], height / image_px[0]] * 2, np.float32)
+    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
     counts, boxes = rule.counts(picture.boxes), picture.boxes.boxes_px.astype(np.float32) * factor
     return Small(small, boxes[counts], boxes[~counts & (picture.boxes.visible_px >= SEES_NOTHING_PX)])
 

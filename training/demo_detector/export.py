@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import date
 from pathlib import Path
 
 import onnx
@@ -18,8 +17,8 @@ NOTE = (
 )
 
 
-def export(network: DemoDetector, input_px: tuple[int, int], path: Path) -> None:
-    """Write it with a fixed input of that height and width."""
+def export(network: DemoDetector, input_px: tuple[int, int], confidence: float, path: Path) -> None:
+    """Write it with a fixed input of that height and width. confidence: the least that is advised."""
     height, width = input_px
     path.parent.mkdir(parents=True, exist_ok=True)
     torch.onnx.export(
@@ -32,17 +31,16 @@ def export(network: DemoDetector, input_px: tuple[int, int], path: Path) -> None
         dynamo=False,
     )
     model = onnx.load(str(path))
-    onnx.helper.set_model_props(model, card(input_px))
+    onnx.helper.set_model_props(model, card(input_px, confidence))
     onnx.checker.check_model(model, full_check=True)
     onnx.save(model, str(path))
 
 
-def card(input_px: tuple[int, int]) -> dict[str, str]:
-    """The metadata: what Ultralytics' exporter writes, and a warning."""
+def card(input_px: tuple[int, int], confidence: float) -> dict[str, str]:
+    """The metadata: what Ultralytics' exporter writes, the operating point, and a warning."""
     return {
         "description": f"Tree-of-Heaven in the simulated forest of mapforest. {NOTE}",
         "author": "the mapforest developers",
-        "date": date.today().isoformat(),
         "license": "Apache-2.0",
         "version": "1",
         "task": "detect",
@@ -50,5 +48,6 @@ def card(input_px: tuple[int, int]) -> dict[str, str]:
         "batch": "1",
         "imgsz": str(list(input_px)),
         "names": str({0: CLASS_NAME}),
+        "confidence": f"{confidence:g}",
         "purpose": "demonstration only",
     }

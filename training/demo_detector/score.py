@@ -13,10 +13,10 @@ import numpy.typing as npt
 from drivers.sim.boxes import Annotation, TreeBoxes
 from drivers.sim.species import TRAITS, Species
 from pipeline.detection.detector import Detector, Settings
-from pipeline.evaluation.matching import average_precision, gather, match, overlaps
+from pipeline.evaluation.matching import Curve, average_precision, curve, gather, match, overlaps
 from training.demo_detector.dataset import Picture, pictures
 
-CONFIDENCE, IOU = 0.35, 0.5
+IOU = 0.5
 LEAST_CONFIDENCE = 0.01
 """Of what the average precision looks at."""
 WELL_SEEN = Annotation(within_m=15.0, visible_px=600, visible_share=0.5)
@@ -69,15 +69,23 @@ class Tally:
         found, missed = (sum(from_m <= m < to_m for m in ranges) for ranges in (self.found_m, self.missed_m))
         return found / max(1, found + missed)
 
-    @property
-    def ap50(self) -> float:
-        """Average precision at IoU 0.5, as COCO has it."""
-        return float(average_precision(gather(self.compared), levels=1)[0])
+    def average_precision(self) -> tuple[float, float]:
+        """AP50 and AP50-95, as COCO has them."""
+        levels = average_precision(gather(self.compared))
+        return float(levels[0]), float(levels.mean())
+
+    def curve(self) -> Curve:
+        """Precision and recall at every confidence."""
+        return curve(gather(self.compared))
 
 
-def score(model: Path, walk: Path, rule: Annotation) -> Tally:
-    """Of a walk, a folder of `dataset`."""
-    detector = Detector(model, Settings(confidence=LEAST_CONFIDENCE, device="cpu", threads=1))
+def opened(model: Path) -> Detector:
+    """As on the payload's processor, but told to say what it is hardly sure of."""
+    return Detector(model, Settings(confidence=LEAST_CONFIDENCE, device="cpu", threads=1))
+
+
+def score(detector: Detector, walk: Path, rule: Annotation) -> Tally:
+    """Of a walk, a folder of `dataset`; found is what the model advises to take for found."""
     total, seen = Tally(), []
     for picture in pictures(walk):
         tally, found = _compared(detector, picture, rule)
@@ -93,7 +101,7 @@ def _compared(detector: Detector, picture: Picture, rule: Annotation) -> tuple[T
     wanted, left_open = picture.boxes[ours & counts], picture.boxes[ours & ~counts]
     taken = match(overlaps(found.boxes_px, wanted.boxes_px), IOU)
     beside = overlaps(found.boxes_px, left_open.boxes_px).max(axis=1, initial=0.0) >= IOU
-    scored, sure = (taken >= 0) | ~beside, found.confidence >= CONFIDENCE
+    scored, sure = (taken >= 0) | ~beside, found.confidence >= detector.info.advised
     hit = np.isin(np.arange(len(wanted)), taken[sure])
     tally = Tally(
         compared=[(found.boxes_px[scored], found.confidence[scored], wanted.boxes_px)],
