@@ -21,7 +21,7 @@ from drivers.sim.video import RenderedVideo
 from drivers.sim.world import World, build
 
 RESERVED_SEEDS = range(1, 21)
-"""Of the demo and of evaluation, in every scenario: nothing is ever trained or tuned on them."""
+"""Of the demo and of evaluation, in every scenario: nothing is ever trained or chosen on them."""
 TRAINING_SEEDS = range(1000, 1130)
 VALIDATION_SEEDS = range(500, 510)
 HELD_OUT = (
