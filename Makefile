@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-UV_COMPILE = $(BIN)/uv pip compile pyproject.toml --extra live --universal --python-version 3.10 \
+UV_COMPILE = $(BIN)/uv pip compile pyproject.toml --extra cpu --extra live --universal --python-version 3.10 \
 	--constraint requirements/constraints.txt --generate-hashes --no-annotate --no-header --no-emit-index-url --quiet
 
 .PHONY: demo test check slow bench-recording screenshots pins clean

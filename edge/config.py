@@ -35,6 +35,7 @@ class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     odometry: str = "/odometry"
     gnss_pose: str = "/gnss/pose"
     tf: str = "/tf"
+    detections: str = "/detections"
 
 
 class Mission(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -97,6 +98,27 @@ class Products(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The growing map in memory; the rest waits on the disk."""
 
 
+class Detection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Detection in the camera's images, live and afterwards."""
+
+    model: str = ""
+    """Path of an ONNX file, "demo" for the one that comes along, or empty for no detection."""
+    confidence: Share = 0.35
+    iou: Share = 0.5
+    """Boxes of one class that overlap by more are one."""
+    rate_hz: Positive = 2.0
+    """Images a second that are looked at; live at most."""
+    threads: Annotated[int, msgspec.Meta(ge=0)] = 0
+    """0: one live, as many as there are cores afterwards."""
+    device: Literal["auto", "tensorrt", "cuda", "cpu"] = "auto"
+    core_share: Positive = 0.5
+    """Of one core, live at most: fewer images are looked at before more is taken."""
+    hot_c: Positive = 85.0
+    """From ten degrees below on ever fewer images are looked at."""
+    cache: str = ""
+    """Folder for what TensorRT builds; empty: the cache of the service or of the user."""
+
+
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What validation expects of one topic."""
 
@@ -132,6 +154,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     odometry: OdometryConfig = OdometryConfig()
     fusion: FusionConfig = FusionConfig()
     products: Products = Products()
+    detection: Detection = Detection()
     bus: Bus = Bus()
     calibration: str = ""
     """Path of the calibration file; empty: the nominal geometry of the payload."""

@@ -36,6 +36,13 @@ def find_control_socket(config: Config, environ: Mapping[str, str] = os.environ,
     return service
 
 
+def cache_folder(environ: Mapping[str, str] = os.environ) -> Path:
+    """What can be made again, but not quickly: the service's cache, else the user's."""
+    if given := environ.get("CACHE_DIRECTORY", "").partition(":")[0]:
+        return Path(given)
+    return Path(environ.get("XDG_CACHE_HOME", "") or Path.home() / ".cache") / "mapforest"
+
+
 def _runtime_folder(environ: Mapping[str, str]) -> Path:
     # systemd joins several runtime directories with colons; ours is the first.
     if given := environ.get("RUNTIME_DIRECTORY", "").partition(":")[0]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from edge.control.messages import Gnss, Host, Location, Status
+from edge.control.messages import Detecting, Gnss, Host, Location, Status
 from ui import units
 from ui.faults import left_tone, queue_tone
 from ui.pieces import Pieces, badge, fit
@@ -90,6 +90,24 @@ def location_line(location: Location) -> Pieces:
     if location.dropped or location.thinned < 1.0:
         behind = f"  {Tone.WARN.symbol} {location.thinned:.0%} of the points, {location.dropped} sweeps left out"
         pieces = (*pieces, (behind, Tone.WARN.text))
+    return pieces
+
+
+def detecting_line(detecting: Detecting) -> Pieces:
+    """What the live detector says: state in a badge, then boxes, pace, delay, model, and what is wrong."""
+    tones = {"watching": Tone.GOOD, "failed": Tone.BAD}
+    tone = tones.get(detecting.state, Tone.WARN)
+    pieces: Pieces = (("DETECT  ", "$quiet-text"), *badge(detecting.state.upper(), tone, BADGE))
+    if detecting.device:
+        pieces = (
+            *pieces,
+            (f"  {detecting.boxes} boxes", "bold"),
+            (f"  {detecting.rate_hz:.1f}/s  {detecting.latency_ms:.0f} ms", ""),
+            (f"  {detecting.model} on {detecting.device}", "$quiet-text"),
+        )
+    if detecting.note:
+        style = tone.text if tone in (Tone.WARN, Tone.BAD) else "$quiet-text"
+        pieces = (*pieces, (f"  {detecting.note}", style))
     return pieces
 
 

@@ -31,6 +31,22 @@ def nal_types(data: bytes) -> Iterator[int]:
         at = data.find(_START, at + 3)
 
 
+def nals(data: bytes) -> Iterator[bytes]:
+    """NAL units in order, without their start codes."""
+    at = data.find(_START)
+    while at >= 0:
+        end = data.find(_START, at + 3)
+        nal = data[at + 3 : end if end >= 0 else len(data)]
+        if nal:
+            yield nal
+        at = end
+
+
+def parameter_sets(data: bytes) -> bytes:
+    """The SPS and PPS of an access unit, in Annex B."""
+    return b"".join(_START + nal for nal in nals(data) if nal[0] & 0x1F in (SPS, PPS))
+
+
 def kind(data: bytes) -> UnitKind:
     """Look at the NAL units up to the first slice: parameter sets stand before it (7.4.1.2.3)."""
     seen: set[int] = set()

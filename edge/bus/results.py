@@ -1,4 +1,4 @@
-"""What the pipeline hands back, as msgpack: poses to be recorded, and its state for the operator."""
+"""What the pipeline hands back, as msgpack: poses and detections to be recorded, and its state for the operator."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from edge.control.messages import Location
+from edge.control.messages import Detecting, Location
 from edge.errors import FormatError
-from edge.recording.messages import GnssPose, OdometryPose, Transforms
+from edge.recording.messages import Detections, GnssPose, OdometryPose, Transforms
 
-Result: TypeAlias = OdometryPose | GnssPose | Transforms | Location
-_KINDS: dict[str, type[Any]] = {kind.__name__: kind for kind in (OdometryPose, GnssPose, Transforms, Location)}
+Result: TypeAlias = OdometryPose | GnssPose | Transforms | Detections | Location | Detecting
+_KINDS: dict[str, type[Any]] = {
+    kind.__name__: kind for kind in (OdometryPose, GnssPose, Transforms, Detections, Location, Detecting)
+}
 
 
 def packed(result: Result) -> list[bytes]:

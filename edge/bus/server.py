@@ -19,7 +19,7 @@ import zmq
 from edge.bus import results
 from edge.bus.envelope import Envelope, subscription
 from edge.config import Config
-from edge.control.messages import Location
+from edge.control.messages import Detecting, Location
 from edge.errors import FormatError
 from edge.paths import BUS_NAME, RESULTS_NAME
 from edge.recording.messages import Recordable
@@ -39,7 +39,7 @@ _STALE_S = 5.0
 
 
 class BusServer:
-    """`offer` is the tap; `sink` gets the poses that come back. Between `start` and `stop`."""
+    """`offer` is the tap; `sink` gets the poses and detections that come back. Between `start` and `stop`."""
 
     def __init__(self, config: Config, folder: Path, sink: Callable[[Recordable], None]) -> None:
         self.problem = ""
@@ -53,6 +53,7 @@ class BusServer:
         self._sequence: Counter[type] = Counter()
         self._subscribed: set[bytes] = set()
         self._location: tuple[float, Location] | None = None
+        self._detecting: tuple[float, Detecting] | None = None
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -95,6 +96,12 @@ class BusServer:
     def location(self) -> Location | None:
         """The pipeline's last word; None when it has been silent. Any thread."""
         known = self._location
+        return known[1] if known is not None and time.monotonic() - known[0] < _STALE_S else None
+
+    @property
+    def detecting(self) -> Detecting | None:
+        """The detector's, likewise."""
+        known = self._detecting
         return known[1] if known is not None and time.monotonic() - known[0] < _STALE_S else None
 
     def stop(self) -> None:
@@ -154,5 +161,7 @@ class BusServer:
             return
         if isinstance(result, Location):
             self._location = time.monotonic(), result
+        elif isinstance(result, Detecting):
+            self._detecting = time.monotonic(), result
         else:
             self._sink(result)

@@ -15,11 +15,11 @@ from edge.control.client import ControlClient
 from edge.control.messages import Status
 from edge.errors import ControlError
 from edge.paths import find_control_socket
-from edge.preflight import disk, host, sensors
+from edge.preflight import detection, disk, host, sensors
 from edge.preflight.check import Check, Outcome
 from edge.service.host_clock import discipline
 
-HELP = """check sensors, clocks, card, permissions and calibration before a walk
+HELP = """check sensors, clocks, card, permissions, calibration and detector before a walk
 
 example: mapforest doctor --config payload.toml
 
@@ -66,6 +66,7 @@ def _checks(config: Config, status: Status | None, listen_s: float) -> list[Chec
         host.check_kernel(),
         *host.check_permissions(config),
         host.check_calibration(config),
+        *detection.check_detection(config),
         host.check_programs(),
     ]
 

@@ -15,21 +15,22 @@ from drivers.errors import DriverError
 from edge import __version__
 from edge.cli import exit_codes
 from edge.errors import EdgeError, UsageError
+from pipeline.detection.errors import DetectionError
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("edge.cli.demo", "the whole mission on the emulated payload"),
     "recorder": ("edge.cli.recorder", "the service: sensors, files, health, control socket"),
-    "pipeline": ("edge.cli.pipeline", "the live service: where the payload is, recorded as it goes"),
+    "pipeline": ("edge.cli.pipeline", "the live service: where the payload is and what it sees, recorded as it goes"),
     "tui": ("edge.cli.tui", "the operator's screen: start, stop and mark with one key each"),
     "start": ("edge.cli.start", "start recording"),
     "stop": ("edge.cli.stop", "stop recording and finish the session"),
     "status": ("edge.cli.status", "what the recorder does and how the sensors are"),
     "mark": ("edge.cli.mark", "write a note into the recording"),
-    "doctor": ("edge.cli.doctor", "preflight: sensors, clocks, card, permissions, calibration"),
+    "doctor": ("edge.cli.doctor", "preflight: sensors, clocks, card, permissions, calibration, detector"),
     "validate": ("edge.cli.validate", "judge a recording"),
     "recover": ("edge.cli.recover", "copy everything sound out of a damaged recording"),
     "info": ("edge.cli.info", "topics, types, counts and rates of a recording"),
-    "process": ("edge.cli.process", "odometry, GNSS fusion and products from a recording"),
+    "process": ("edge.cli.process", "odometry, GNSS fusion, detection and products from a recording"),
     "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
     "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }
@@ -125,7 +126,7 @@ def _run(command: Command, options: argparse.Namespace) -> int:
     except UsageError as error:
         print(f"mapforest: {error}", file=sys.stderr)
         return exit_codes.USAGE
-    except (EdgeError, DriverError) as error:
+    except (EdgeError, DriverError, DetectionError) as error:
         print(f"mapforest: {error}", file=sys.stderr)
         return exit_codes.FAILED
     except KeyboardInterrupt:

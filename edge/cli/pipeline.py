@@ -13,7 +13,7 @@ from edge.config import load
 from edge.errors import UsageError
 from edge.paths import find_control_socket
 
-HELP = """run the live pipeline: where the payload is, from the recorder's sensors, back into its recording
+HELP = """run the live pipeline: where the payload is and what the camera sees, back into the recording
 
 example: mapforest pipeline --config /etc/mapforest/mapforest.toml
 It needs a recorder (`mapforest recorder`) and waits for one. Its state is in `mapforest status` and on the screen."""

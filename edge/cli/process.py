@@ -13,16 +13,17 @@ from rich.markup import escape
 from edge.cli import exit_codes
 from edge.cli.stage_bar import StageBar
 from edge.cli.words import console, duration
-from edge.config import load
+from edge.config import Config, load
 from edge.errors import UsageError
 
 if TYPE_CHECKING:  # heavy: numpy, numba
     from edge.process.products_stage import ProductFacts
     from edge.replay.geometry import Matrix
 
-HELP = """odometry, GNSS fusion and products from a recording, faster than real time
+HELP = """odometry, GNSS fusion, detection and products from a recording, faster than real time
 
 example: mapforest process recordings/20261124T101500Z_walk
+         mapforest process recordings/20261124T101500Z_walk --detect models/ailanthus.onnx
          mapforest process walk.mcap --output walk --lidar /ouster/points --imu /ouster/imu
 
 Takes sessions of mapforest, and recordings of ROS 2 in MCAP: PointCloud2 or Livox CustomMsg with the time of each
@@ -37,6 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output", type=Path, metavar="DIR", help="where the products go (default: beside the recording)"
     )
     parser.add_argument("--no-gnss", action="store_true", help="leave the fixes out: a local map")
+    parser.add_argument(
+        "--detect", metavar="MODEL", help='ONNX file of the detector, "demo" for ours, "" for none (detection.model)'
+    )
     parser.add_argument("--fresh", action="store_true", help="do again what was done before")
     parser.add_argument("--clean", action="store_true", help="take the files between the stages away at the end")
     parser.add_argument("--lidar", default="", metavar="TOPIC", help="topic of the point clouds")
@@ -59,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     task = Task(args.recording, args.output, not args.no_gnss, args.fresh, options)
     out = console(stderr=args.json)
     with StageBar(quiet=args.json) as bar:
-        done = process(task, load(args.config), bar)
+        done = process(task, _config(args), bar)
     if args.clean:
         clean(task)
     facts = done.facts
@@ -77,6 +81,13 @@ def run(args: argparse.Namespace) -> int:
             out.print(f"  {escape(str(done.folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)
     poor = facts.frame == "odom" and not args.no_gnss
     return exit_codes.WARNINGS if poor or facts.estimates < 0.9 * facts.sweeps else exit_codes.GOOD
+
+
+def _config(args: argparse.Namespace) -> Config:
+    config = load(args.config)
+    if args.detect is None:
+        return config
+    return msgspec.structs.replace(config, detection=msgspec.structs.replace(config.detection, model=args.detect))
 
 
 def _told(facts: ProductFacts, redone: tuple[str, ...]) -> str:

@@ -12,12 +12,12 @@ import msgspec
 from edge.cli import exit_codes
 from edge.cli.asking import connect
 from edge.control.client import ControlClient
-from edge.control.messages import Gnss, Host, Location, Recording, Sensor, Status, Verdict
+from edge.control.messages import Detecting, Gnss, Host, Location, Recording, Sensor, Status, Verdict
 
 HELP = """show what the recorder does and how the sensors are
 
 example: mapforest status --watch
-Ends with 0 when all is well, 3 when a sensor or the recorder has a problem."""
+Ends with 0 when all is well, 3 when a sensor, the recorder or the detector has a problem."""
 
 _MIB = 1 << 20
 _CLEAR = "\x1b[H\x1b[2J"
@@ -49,6 +49,8 @@ def lines(status: Status) -> Iterator[str]:
         yield _gnss_line(status.gnss)
     if status.location:
         yield _location_line(status.location)
+    if status.detecting:
+        yield _detecting_line(status.detecting)
     yield from _host_lines(status.host)
     if status.verdict:
         yield from _verdict_lines(status.verdict)
@@ -72,7 +74,9 @@ def _text(args: argparse.Namespace, status: Status) -> str:
 
 
 def _is_well(status: Status) -> bool:
-    return not status.problems and all(sensor.state == "ok" for sensor in status.sensors)
+    detecting = status.detecting
+    fails = detecting is not None and detecting.state == "failed"
+    return not status.problems and not fails and all(sensor.state == "ok" for sensor in status.sensors)
 
 
 def _headline(status: Status) -> str:
@@ -112,6 +116,16 @@ def _location_line(location: Location) -> str:
     if location.dropped or location.thinned < 1.0:
         line += f", {location.thinned:.0%} of the points, {location.dropped} sweeps left out"
     return f"{line}  {location.note}".rstrip()
+
+
+def _detecting_line(detecting: Detecting) -> str:
+    line = f"detect   {detecting.state}, {detecting.model}"
+    if detecting.device:
+        line += (
+            f" on {detecting.device}, {detecting.rate_hz:.1f} images/s, {detecting.latency_ms:.0f} ms behind, "
+            f"{detecting.boxes} boxes in the last second"
+        )
+    return f"{line}  {detecting.note}".rstrip()
 
 
 def _gnss_line(gnss: Gnss) -> str:

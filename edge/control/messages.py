@@ -144,6 +144,28 @@ class Location(msgspec.Struct, frozen=True):
     """What is wrong, in words."""
 
 
+class Detecting(msgspec.Struct, frozen=True):
+    """What the live detector says. state: starting, watching, slowed, waiting (for video), failed."""
+
+    state: str
+    model: str
+    sha256: str = ""
+    device: str = ""
+    """That the model runs on: tensorrt, cuda, cpu."""
+    rate_hz: float = 0.0
+    """Images looked at, over the last seconds."""
+    latency_ms: float = 0.0
+    """From the exposure to the boxes, the last image's."""
+    boxes: int = 0
+    """In the images of the last second."""
+    looked: int = 0
+    """Images looked at since the pipeline started."""
+    passed_over: int = 0
+    """Images that came and were not: an older one is never looked at when a newer is there."""
+    note: str = ""
+    """What is wrong, in words."""
+
+
 class Verdict(msgspec.Struct, frozen=True):
     """The validator's word on the last session: PASS, WARN or FAIL, with the reasons, worst first."""
 
@@ -170,6 +192,8 @@ class Status(msgspec.Struct, frozen=True, tag="status"):
     version: int = PROTOCOL_VERSION
     location: Location | None = None
     """None without a live pipeline."""
+    detecting: Detecting | None = None
+    """None without a live detector."""
 
 
 Line = Request | Reply | Status

@@ -6,8 +6,9 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from edge.bus.client import BusClient
 from edge.bus.envelope import Envelope
 from edge.bus.results import Result
 from edge.config import Config
-from edge.control.messages import Location
+from edge.control.messages import Detecting, Location
 from edge.live.governor import Governor
 from edge.live.intake import LiveIntake
 from edge.live.poses import gnss_pose, odometry_pose, transforms
@@ -27,6 +28,9 @@ from edge.replay.pairing import Pairing, Sweep
 from edge.ros.frames import BASE_LINK, LIDAR
 from pipeline.estimates import GlobalPose, OdometryEstimate
 from pipeline.odometry.warm import warm_up
+
+if TYPE_CHECKING:
+    from edge.live.detection import LiveDetection
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +57,9 @@ class LivePipeline:
         config: Config,
         load: Callable[[], Estimators] = estimators,
         clock: Callable[[], int] = time.monotonic_ns,
+        detecting: Callable[[], Detecting] | None = None,
     ) -> None:
+        """detecting: what the detector beside it says, where there is one."""
         transforms_ = load_calibration(config.calibration).transforms
         geometry = find_geometry(transforms_, transforms_, BASE_LINK, LIDAR, livox=True)
         built = load()
@@ -61,6 +67,7 @@ class LivePipeline:
         self._fusion = built.fusion(fusion_config(config, geometry))
         self._intake = LiveIntake(config.topics)
         self._clock = clock
+        self._detecting = detecting
         self._pairing = Pairing()
         self._governor = Governor()
         self._estimate: OdometryEstimate | None = None
@@ -89,6 +96,8 @@ class LivePipeline:
         if now_ns - self._told_ns > TELL_S * 1e9:
             self._told_ns = now_ns
             bus.send(self.location(now_ns))
+            if self._detecting is not None:
+                bus.send(self._detecting())
 
     def location(self, now_ns: int) -> Location:
         """For the operator."""
@@ -142,7 +151,10 @@ def serve(config: Config, folder: Path, stop: threading.Event) -> None:
 
     The kernels are compiled first: what came meanwhile would be lost, and the start of a walk with it.
     """
-    pipeline = LivePipeline(config)
+    detection = _detection(config, folder)
+    pipeline = LivePipeline(config, detecting=None if detection is None else lambda: detection.state)
+    if detection is not None:
+        detection.start(stop)
     log.info("loading the compiled kernels (the first time on a machine they are compiled: a minute)")
     warm_up(config.odometry)
     with BusClient(folder, pipeline.topics) as bus:
@@ -150,3 +162,14 @@ def serve(config: Config, folder: Path, stop: threading.Event) -> None:
         pipeline.run(bus, stop)
         lost = ", ".join(f"{count} of {topic}" for topic, count in bus.lost.items() if count) or "none"
         log.info("live pipeline ends; messages lost on the bus: %s", lost)
+    if detection is not None:
+        detection.join()
+
+
+def _detection(config: Config, folder: Path) -> LiveDetection | None:
+    """None without a model."""
+    if not config.detection.model:
+        return None
+    from edge.live.detection import LiveDetection  # noqa: PLC0415 - OpenCV and PyAV, only where they are needed
+
+    return LiveDetection(config, partial(BusClient, folder))

@@ -1,1 +1,1 @@
-"""The onboard pipeline over a recording: odometry, fusion, products; stage by stage, each finished one kept."""
+"""The onboard pipeline over a recording: odometry, fusion, detection, products; each stage kept when finished."""

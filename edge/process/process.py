@@ -1,4 +1,4 @@
-"""The work on one recording: three stages, each kept when finished, each redone when what it was made from changed."""
+"""The work on one recording: its stages, each kept when finished, each redone when what it was made from changed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -21,7 +22,10 @@ from edge.process.watch import Watch
 from edge.replay.replay import Replay, ReplayOptions
 from edge.validation.files import recording_files
 
-STAGES = ("odometry", "fusion", "products")
+if TYPE_CHECKING:  # heavy: OpenCV
+    from pipeline.detection.detector import Detector
+
+STAGES = ("odometry", "fusion", "detection", "products")
 ANTENNA = "antenna.json"
 """Where the recording says the antenna is: the fusion does not open it again."""
 _FORMAT = 1
@@ -66,7 +70,10 @@ class Done:
 def process(
     task: Task, config: Config, watch: Watch | None = None, load: Callable[[], Estimators] = estimators
 ) -> Done:
-    """Odometry, fusion, products. FormatError for what cannot be used, EdgeError where nothing could be estimated."""
+    """Odometry, fusion, detection where a model is configured, products.
+
+    FormatError for what cannot be used, EdgeError where nothing could be estimated, DetectionError for a wrong model.
+    """
     files = recording_files(task.targets)
     work = task.folder / "work"
     with alone(_made(work)):
@@ -82,27 +89,51 @@ class _Work:
     checkpoint: Checkpoint
     prints: list[tuple[str, int, str]]
     redone: list[str] = field(default_factory=list)
+    detector: Detector | None = None
+    """While its stage is still to be done."""
 
     def run(self) -> Done:
         if self.task.fresh:
             for stage in STAGES:
                 self.checkpoint.begin(stage)
-        keys = self._keys()
-        self._stage("odometry", keys[0], self._odometry)
-        self._stage("fusion", keys[1], self._fusion)
-        self._stage("products", keys[2], self._products, [self.task.folder / "products.json"])
+        odometry, fusion = self._keys()
+        detection = self._detection_key()
+        if detection and not self.checkpoint.done("detection", detection):
+            self.detector = self.open_detector()  # first: a wrong model is told before an hour of odometry
+        self._stage("odometry", odometry, self._odometry)
+        self._stage("fusion", fusion, self._fusion)
+        if detection:
+            self._stage("detection", detection, self._detection)
+        last = key_of(fusion, detection, self.task.session)
+        self._stage("products", last, self._products, [self.task.folder / "products.json"])
         facts = msgspec.json.decode((self.task.folder / "products.json").read_bytes(), type=ProductFacts)
         return Done(self.task.folder, facts, tuple(self.redone))
 
-    def _keys(self) -> tuple[str, str, str]:
+    def open_detector(self) -> Detector:
+        """As configured. DetectionError."""
+        from edge.detection import open_detector  # noqa: PLC0415 - OpenCV, and only where a model is configured
+
+        return open_detector(self.config.detection)
+
+    def _keys(self) -> tuple[str, str]:
         options = self.task.replay
         pose = None if options.lidar_pose is None else options.lidar_pose.tolist()
         wanted = options.wanted
         asked = [wanted.lidar, wanted.imu, wanted.fix, options.time_field, pose, self.task.gnss]
         settings = [self.config.odometry, self.config.products, self.config.topics, self.config.calibration]
         first = key_of(_FORMAT, __version__, self.prints, asked, settings)
-        second = key_of(first, self.config.fusion)
-        return first, second, key_of(second, self.task.session)
+        return first, key_of(first, self.config.fusion)
+
+    def _detection_key(self) -> str:
+        """Empty without a model."""
+        settings = self.config.detection
+        if not settings.model:
+            return ""
+        from edge.detection import model_path  # noqa: PLC0415
+        from pipeline.detection.runtime import sha256  # noqa: PLC0415
+
+        said = [sha256(model_path(settings.model)), settings.confidence, settings.iou, settings.rate_hz]
+        return key_of(_FORMAT, __version__, self.prints, self.config.topics, said)
 
     def _stage(self, name: str, key: str, run: Callable[[Path], object], outputs: Sequence[Path] = ()) -> None:
         done = self.checkpoint.done(name, key, outputs)
@@ -126,12 +157,18 @@ class _Work:
         config = msgspec.structs.replace(self.config.fusion, antenna_m=antenna)
         FusionStage(odometry, self.load().smooth, config).run(folder, self.watch.advance)
 
+    def _detection(self, folder: Path) -> None:
+        from edge.process.detection_stage import DetectionStage  # noqa: PLC0415
+
+        assert self.detector is not None
+        DetectionStage(self.task.targets, self.config, self.detector).run(folder, self.watch.advance)
+
     def _products(self, _folder: Path) -> None:
         software = f"mapforest {__version__}"
         voxel_m = self.config.products.voxel_m
-        ProductsStage(self.checkpoint.folder, self.task.folder, voxel_m, self.task.session, software).run(
-            self.watch.advance
-        )
+        detected = bool(self.config.detection.model)
+        stage = ProductsStage(self.checkpoint.folder, self.task.folder, voxel_m, self.task.session, software, detected)
+        stage.run(self.watch.advance)
 
 
 def clean(task: Task) -> None:

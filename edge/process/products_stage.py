@@ -1,7 +1,8 @@
-"""Third stage: what is handed out, in the formats that others open."""
+"""Last stage: what is handed out, in the formats that others open."""
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.messages import GnssFix
-from edge.process import fusion_stage, odometry_stage
+from edge.process import detections_file, fusion_stage, odometry_stage
+from edge.process.detections_file import DetectionFacts
 from edge.process.fusion_stage import FusionFacts, read_placement
 from edge.process.odometry_stage import OdometryFacts, read_fixes
 from pipeline.gnss.geodesy import Datum
@@ -34,6 +36,7 @@ MADE = (
     "trajectory.html",
     "map.laz",
     "map_local.laz",
+    "detections.msgpack",
     "products.json",
 )
 """Every name this stage may leave behind; those of an earlier run are taken away first."""
@@ -61,6 +64,8 @@ class ProductFacts(msgspec.Struct):
     odometry_seconds: float = 0.0
     notes: tuple[str, ...] = ()
     software: str = ""
+    detection: DetectionFacts | None = None
+    """None where no model was configured."""
     host_offset_ns: int | None = None
     """Session time minus the recording computer's monotonic time; None in recordings of others."""
 
@@ -74,6 +79,8 @@ class ProductsStage:
     voxel_m: float
     session: str
     software: str
+    detected: bool = False
+    """There is a detection stage's folder."""
 
     def run(self, advance: Callable[[float], None]) -> ProductFacts:
         """Make everything again."""
@@ -87,6 +94,8 @@ class ProductsStage:
         facts = self._facts(track, placement, done, fused)
         self._trajectories(track, placement, facts)
         self._page(track, placement, facts, read_fixes(odometry / odometry_stage.FIXES))
+        if self.detected:
+            self._detections(facts)
         facts.points = self._map(track, placement, facts, advance)
         with _whole(self.output / "products.json") as path:
             path.write_bytes(msgspec.json.format(msgspec.json.encode(facts), indent=2) + b"\n")
@@ -169,6 +178,16 @@ class ProductsStage:
         )
         with _whole(self.output / "trajectory.html", facts, "plots, readable offline") as path:
             write_page(path, story)
+
+    def _detections(self, facts: ProductFacts) -> None:
+        folder = self.work / "detection"
+        found = msgspec.json.decode((folder / detections_file.FACTS).read_bytes(), type=DetectionFacts)
+        model = found.model
+        who = f"detector {model.name} (sha256 {model.sha256[:12]}) on {model.device}"
+        facts.detection = found
+        facts.notes += (f"{who}: {found.boxes} boxes in {found.images} images", *found.notes)
+        with _whole(self.output / detections_file.DETECTIONS, facts, "boxes in images, by stamp, as msgpack") as path:
+            shutil.copyfile(folder / detections_file.DETECTIONS, path)
 
     def _map(
         self,

@@ -84,5 +84,23 @@ class Transforms:
     transforms: tuple[Transform, ...]
 
 
-Recordable: TypeAlias = Message | Diagnostics | Mark | OdometryPose | GnssPose | Transforms
+@dataclass(frozen=True, slots=True)
+class DetectedBox:
+    """box_px: x_min, y_min, x_max, y_max in the image as the camera sent it. confidence: 0..1."""
+
+    box_px: tuple[float, float, float, float]
+    confidence: float
+    class_name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Detections:
+    """What stands in one image, from the live pipeline; also that nothing does. stamp_ns: the image's own."""
+
+    stamp_ns: int
+    receive_ns: int
+    boxes: tuple[DetectedBox, ...]
+
+
+Recordable: TypeAlias = Message | Diagnostics | Mark | OdometryPose | GnssPose | Transforms | Detections
 """Everything that can be offered to a recording."""

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from edge.errors import FormatError
 from edge.ros import schemas
 from edge.ros.cdr import CdrReader
+from edge.ros.decode_detections import decode_detections
 from edge.ros.decode_poses import decode_odometry, decode_pose
 from edge.ros.frames import Transform
 
@@ -268,5 +269,6 @@ DECODERS: dict[str, Callable[[bytes], Any]] = {
     schemas.TF_MESSAGE: decode_transforms,
     schemas.ODOMETRY: decode_odometry,
     schemas.POSE: decode_pose,
+    schemas.DETECTIONS: decode_detections,
 }
 """ROS type -> decoder."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from drivers.messages import FixQuality, GnssFix, ImuSample, LidarScan, NmeaSentence, SensorEvent, Severity, VideoFrame
-from edge.recording.messages import Diagnostics, GnssPose, Mark, OdometryPose, Transforms
+from edge.recording.messages import Detections, Diagnostics, GnssPose, Mark, OdometryPose, Transforms
 from edge.ros.cdr import LITTLE_ENDIAN, NS_PER_S, CdrWriter
 from edge.ros.frames import BASE_LINK, CAMERA, GNSS_ANTENNA, LIDAR, MAP, ODOM, Transform
 
@@ -35,6 +35,7 @@ _POINT_FIELDS = (("x", 7), ("y", 7), ("z", 7), ("intensity", 7), ("tag", 2), ("l
 _IMU = struct.Struct("<4siII10s2x37d")
 _IMU_NO_ORIENTATION = (0.0, 0.0, 0.0, 1.0, -1.0, *[0.0] * 8)
 _UNKNOWN_COVARIANCE = (0.0,) * 9
+_NO_POSE = (0.0,) * 6 + (1.0,) + (0.0,) * 36
 _ALL_CONSTELLATIONS = 15
 _LOG_LEVEL = {Severity.INFO: 20, Severity.WARNING: 30, Severity.ERROR: 40}
 _NAV_SAT_STATUS = {
@@ -168,6 +169,16 @@ def encode_moving(message: Transforms, stamp_ns: int) -> bytes:
     return encode_transforms(message.transforms, stamp_ns)
 
 
+def encode_detections(message: Detections, stamp_ns: int) -> bytes:
+    """vision_msgs/Detection2DArray; one hypothesis a box, its pose in space unknown (0)."""
+    writer = CdrWriter().header(stamp_ns, CAMERA).pack("I", len(message.boxes))
+    for one in message.boxes:
+        left, top, right, bottom = one.box_px
+        writer.header(stamp_ns, CAMERA).pack("I", 1).string(one.class_name).pack("d", one.confidence, *_NO_POSE)
+        writer.pack("d", (left + right) / 2, (top + bottom) / 2, 0.0, right - left, bottom - top).string("")
+    return writer.finish()
+
+
 ENCODERS: dict[type, Callable[[Any, int], bytes]] = {
     LidarScan: encode_scan,
     ImuSample: encode_imu,
@@ -180,5 +191,6 @@ ENCODERS: dict[type, Callable[[Any, int], bytes]] = {
     OdometryPose: encode_odometry,
     GnssPose: encode_pose,
     Transforms: encode_moving,
+    Detections: encode_detections,
 }
 """Kind of message -> encoder(message, session stamp)."""

@@ -14,6 +14,7 @@ DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 LOG = "rcl_interfaces/msg/Log"
 ODOMETRY = "nav_msgs/msg/Odometry"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+DETECTIONS = "vision_msgs/msg/Detection2DArray"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 
 

@@ -10,7 +10,7 @@ import msgspec
 from drivers.messages import GnssFix, ImuSample, LidarScan, NmeaSentence, SensorEvent, VideoFrame
 from edge.config import Topics
 from edge.errors import ConfigError
-from edge.recording.messages import Diagnostics, GnssPose, Mark, OdometryPose, Transforms
+from edge.recording.messages import Detections, Diagnostics, GnssPose, Mark, OdometryPose, Transforms
 from edge.ros import schemas
 
 _DURATIONS = "    sec: 9223372036\n    nsec: 854775807\n"
@@ -56,6 +56,7 @@ def channels(topics: Topics) -> Mapping[type, Channel]:
         OdometryPose: Channel(topics.odometry, schemas.ODOMETRY),
         GnssPose: Channel(topics.gnss_pose, schemas.POSE),
         Transforms: Channel(topics.tf, schemas.TF_MESSAGE),
+        Detections: Channel(topics.detections, schemas.DETECTIONS),
     }
 
 

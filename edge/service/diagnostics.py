@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from drivers.clock import ClockState
 from drivers.driver import SensorHealth, SensorState
+from edge.control.messages import Detecting
 from edge.recording.account import RecordingStatus
 from edge.recording.messages import Diagnostics, DiagnosticStatus, Level
 from edge.service.host import HostSample
@@ -36,12 +37,16 @@ def diagnostics(
     host: HostSample,
     clock: SystemClock,
     recording: RecordingStatus | None,
+    *,
+    detecting: Detecting | None = None,
 ) -> Diagnostics:
-    """One message: a status a sensor, one of the computer, one of its clock, one of the recorder."""
+    """One message: a status for each sensor, the computer, its clock, the recorder and the live detector."""
     statuses = [_sensor(health) for health in sensors]
     statuses += [_host(host), _system_clock(clock)]
     if recording is not None:
         statuses.append(_recorder(recording, now_ns))
+    if detecting is not None:
+        statuses.append(_detector(detecting))
     return Diagnostics(now_ns, now_ns, tuple(statuses))
 
 
@@ -91,6 +96,21 @@ def _host(host: HostSample) -> DiagnosticStatus:
     values.append(("throttled_by", host.throttled_by))
     message = f"slowed down by {host.throttled_by}" if host.throttled else "ok"
     return DiagnosticStatus("host", Level.WARN if host.throttled else Level.OK, message, "", tuple(values))
+
+
+def _detector(detecting: Detecting) -> DiagnosticStatus:
+    values: Values = [
+        ("state", detecting.state),
+        ("model", detecting.model),
+        ("sha256", detecting.sha256),
+        ("device", detecting.device),
+        ("rate_hz", f"{detecting.rate_hz:.2f}"),
+        ("latency_ms", f"{detecting.latency_ms:.0f}"),
+        ("looked", str(detecting.looked)),
+        ("passed_over", str(detecting.passed_over)),
+    ]
+    level = Level.ERROR if detecting.state == "failed" else Level.OK if detecting.state == "watching" else Level.WARN
+    return DiagnosticStatus("pipeline/detection", level, detecting.note or detecting.state, "", tuple(values))
 
 
 def _system_clock(clock: SystemClock) -> DiagnosticStatus:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from drivers.driver import SensorHealth, SensorState
 from edge.config import Config
-from edge.control.messages import Host, Location, Recording, Status
+from edge.control.messages import Detecting, Host, Location, Recording, Status
 from edge.paths import recordings_folder
 from edge.recording.account import RecordingStatus
 from edge.recording.disk import Disk, Space, floor_bytes
@@ -66,6 +66,8 @@ class Health:
         """Standing problems of the service itself: no live view, a file that could not be repaired."""
         self.location: Callable[[], Location | None] = lambda: None
         """The live pipeline's last word."""
+        self.detecting: Callable[[], Detecting | None] = lambda: None
+        """The live detector's."""
         self._config = config
         self._supervisor = supervisor
         self._intake = intake
@@ -97,7 +99,8 @@ class Health:
             not all_stuck and self._writes(recording, now_ns),
         )
         clock = SystemClock(self._steps.offset_ns, self._steps.steps, self._looked.discipline)
-        self._intake.take(diagnostics(now_ns, sensors, self._looked.host, clock, recording))
+        told = diagnostics(now_ns, sensors, self._looked.host, clock, recording, detecting=self.detecting())
+        self._intake.take(told)
         return self._looked
 
     def status(self, now_ns: int) -> Status:
@@ -117,6 +120,7 @@ class Health:
             verdict=self._judge.verdict,
             problems=tuple(self._problems(looked, recording, now_ns)),
             location=self.location(),
+            detecting=self.detecting(),
         )
 
     def summary(self) -> str:

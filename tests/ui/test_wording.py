@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.control.messages import Clock, Gnss, Location, Reply, Request, Stream, Verdict
+from edge.control.messages import Clock, Detecting, Gnss, Location, Reply, Request, Stream, Verdict
 from ui import samples
 from ui.answers import answer, goodbye, noted
 from ui.faults import faults
@@ -21,7 +21,7 @@ from ui.situation import Link, Situation
 from ui.sparks import BARS, sparkline
 from ui.tone import SYMBOLS, Tone, worst
 from ui.verdict import verdict_lines
-from ui.vitals import LABELS, gnss_line, gnss_tone, location_line, vitals
+from ui.vitals import LABELS, detecting_line, gnss_line, gnss_tone, location_line, vitals
 
 GOOD = Situation(Link.ONLINE, samples.GOOD)
 
@@ -258,6 +258,19 @@ def test_fit_shows_that_something_was_cut():
     assert fit("abcdef", 4) == "abc…"
     assert fit("abcd", 4) == "abcd"
     assert fit("abcd", 0) == ""
+
+
+DETECTING = Detecting("watching", "ailanthus", "ab12", "cuda", 2.0, 180.4, 3)
+
+
+def test_the_detector_says_boxes_pace_and_delay_and_what_is_wrong():
+    assert "WATCHING" in text_of(detecting_line(DETECTING))
+    assert text_of(detecting_line(DETECTING)).endswith("  3 boxes  2.0/s  180 ms  ailanthus on cuda")
+    slowed = changed(DETECTING, state="slowed", note="80 °C: 1.0 images/s")
+    assert text_of(detecting_line(slowed)).endswith("80 °C: 1.0 images/s")
+    failed = Detecting("failed", "gone.onnx", note="no such file")
+    assert text_of(detecting_line(failed)).endswith("FAILED      no such file")
+    assert any(Tone.BAD.badge == style for _, style in detecting_line(failed))
 
 
 LOCATION = Location("tracking", 812.4, 1.3, 0.42, (12.34, -5.0, 1.0), True, 0, 1.0, 0.1)

@@ -13,16 +13,18 @@ from edge.bus.client import BusClient
 from edge.bus.envelope import Envelope
 from edge.bus.server import BusServer
 from edge.config import Config
-from edge.control.messages import Location
+from edge.control.messages import Detecting, Location
 from edge.errors import FormatError
 from edge.live.intake import LiveIntake
-from edge.recording.messages import GnssPose, OdometryPose, Transforms
+from edge.recording.messages import DetectedBox, Detections, GnssPose, OdometryPose, Transforms
 from edge.ros.frames import Transform
 from tests.edge.recording import recording_scene as scene
 from tests.waiting import wait_for
 
 CONFIG = Config()
 LOCATION = Location("tracking", 12.5, 1.2, 0.3, (1.0, 2.0, 3.0), True, 4, 0.5, 0.1)
+DETECTING = Detecting("watching", "ailanthus", "ab12", "cpu", 2.0, 180.0, 3, 40, 560)
+FOUND = Detections(5, 6, (DetectedBox((1.0, 2.0, 3.0, 4.0), 0.5, "ailanthus"),))
 POSE = OdometryPose(5, 6, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), (0.5,) * 36, (0.1, 0.2, 0.3))
 
 
@@ -113,13 +115,15 @@ def first(client, got: int) -> int:
 
 def test_results_come_back_to_be_recorded_and_shown(recorder, tmp_path):
     turn = Transforms(5, 6, (Transform("odom", "base_link", (1.0, 2.0, 3.0)),))
+    placed = GnssPose(5, 6, POSE.position_m, POSE.rotation_xyzw, POSE.covariance)
     with BusClient(tmp_path, []) as client:
-        for result in (POSE, turn, GnssPose(5, 6, POSE.position_m, POSE.rotation_xyzw, POSE.covariance), LOCATION):
+        for result in (POSE, turn, placed, FOUND, DETECTING, LOCATION):
             client.send(result)
         wait_for(lambda: recorder.bus.location is not None, 5.0)
-    assert recorder.bus.location == LOCATION
+    assert (recorder.bus.location, recorder.bus.detecting) == (LOCATION, DETECTING)
     assert recorder.taken[:2] == [POSE, turn]
     assert isinstance(recorder.taken[2], GnssPose)
+    assert recorder.taken[3:] == [FOUND]
 
 
 def test_the_pipeline_finds_a_recorder_that_starts_later_and_one_that_comes_back(tmp_path):

@@ -1,7 +1,7 @@
 """The compact view of `mapforest status`."""
 
 from edge.cli.status import lines
-from edge.control.messages import Clock, Gnss, Host, Recording, Sensor, Status, Stream, Verdict
+from edge.control.messages import Clock, Detecting, Gnss, Host, Recording, Sensor, Status, Stream, Verdict
 
 HOST = Host(
     cpu_percent=31.4,
@@ -38,6 +38,7 @@ def test_everything_an_operator_needs_is_there() -> None:
         recording=Recording("s1", "/rec/s1", "walk", 61.0, 3 << 20, 1234, 1, 2, 12.0, 0),
         verdict=Verdict("s0", "WARN", ("gap of 2 s on /gnss/fix",)),
         problems=("the card is slow",),
+        detecting=Detecting("slowed", "ailanthus", "ab12", "cpu", 1.0, 412.3, 2, note="80 °C: 1.0 images/s"),
     )
     assert list(lines(status)) == [
         "RECORDING s1  0:01:01",
@@ -48,6 +49,8 @@ def test_everything_an_operator_needs_is_there() -> None:
         "gopro    searching  battery 80 %",
         "  ! nobody answers: switch it on",
         "gnss     RTK float, 14 satellites, sigma 0.50 m horizontal 0.90 m vertical, 0.2 s ago",
+        "detect   slowed, ailanthus on cpu, 1.0 images/s, 412 ms behind, 2 boxes in the last second  "
+        "80 °C: 1.0 images/s",
         "host     cpu 31 %, memory 40 %, 66 C, THROTTLED",
         "card     50.0 GiB free, 2:01:05 left, queue 2%",
         "clock    not synchronised",

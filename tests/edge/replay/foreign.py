@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,12 @@ _CUSTOM = (
     "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
     "livox_ros_driver2/CustomPoint[] points\n"
 )
+_VIDEO = "builtin_interfaces/Time timestamp\nstring frame_id\nuint8[] data\nstring format\n"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 STORE.register(
     get_types_from_msg(_CUSTOM_POINT, "livox_ros_driver2/msg/CustomPoint")
     | get_types_from_msg(_CUSTOM, "livox_ros_driver2/msg/CustomMsg")
+    | get_types_from_msg(_VIDEO, "foxglove_msgs/msg/CompressedVideo")
 )
 T = STORE.types
 _DATATYPES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
@@ -119,6 +122,13 @@ def fix(stamp_ns: int, status: int = 0, sigma_m: float = 1.5, latitude: float = 
     )
 
 
+def video(stamp_ns: int, unit: bytes, codec: str = "h264"):
+    """One access unit."""
+    time = header(stamp_ns, "").stamp
+    data = np.frombuffer(unit, np.uint8)
+    return T["foxglove_msgs/msg/CompressedVideo"](timestamp=time, frame_id="camera", data=data, format=codec)
+
+
 def transform(parent: str, child: str, x: float, yaw_half: float = 0.0):
     vector, quaternion = T["geometry_msgs/msg/Vector3"], T["geometry_msgs/msg/Quaternion"]
     one = T["geometry_msgs/msg/TransformStamped"](
@@ -142,12 +152,12 @@ class Bag:
         self.messages.append((topic, log_ns, message))
 
     def write(self, path: Path, *, chunk_size: int = 20_000, chunked: bool = True) -> Path:
-        """In the order they were added."""
+        """In order of time."""
         with path.open("wb") as stream:
             writer = Writer(stream, chunk_size=chunk_size, compression=CompressionType.LZ4, use_chunking=chunked)
             writer.start("ros2", "test")
             ids: dict[str, int] = {}
-            for topic, log_ns, message in self.messages:
+            for topic, log_ns, message in sorted(self.messages, key=itemgetter(1)):
                 if topic not in ids:
                     schema = writer.register_schema(message.__msgtype__, "ros2msg", b"")
                     ids[topic] = writer.register_channel(topic, "cdr", schema, {})

@@ -5,8 +5,8 @@ from pathlib import Path
 from mcap.reader import make_reader
 
 from edge.bus.client import BusClient
-from edge.control.messages import Location, Request
-from edge.recording.messages import OdometryPose
+from edge.control.messages import Detecting, Location, Request
+from edge.recording.messages import Detections, OdometryPose
 from edge.service.judge import Judge
 from edge.service.service import Service
 from edge.service.supervisor import Plan
@@ -14,6 +14,7 @@ from tests.edge.service.fakes import FakeDriver, config, imu, running
 from tests.waiting import wait_for
 
 LOCATION = Location("tracking", 12.5, 1.2, 0.3, (1.0, 2.0, 3.0), True, 4, 0.5, 0.1)
+DETECTING = Detecting("watching", "ailanthus", "ab12", "cpu", 2.0, 180.0, 3, 40, 560)
 POSE = OdometryPose(5, 6, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), (0.5,) * 36, (0.1, 0.2, 0.3))
 
 
@@ -37,9 +38,13 @@ def test_the_pipeline_hears_the_sensors_and_its_poses_are_in_the_file(tmp_path: 
         wait_for(hears, 10.0)
         folder = Path(recorder.request(Request("start")).folder)
         pipeline.send(POSE)
+        pipeline.send(Detections(5, 6, ()))
+        pipeline.send(DETECTING)
         pipeline.send(LOCATION)
         wait_for(lambda: recorder.status().location == LOCATION, 10.0)
+        assert recorder.status().detecting == DETECTING
         recorder.request(Request("stop"))
     with next(folder.glob("*.mcap")).open("rb") as file:
         found = [(channel.topic, schema.name) for schema, channel, _ in make_reader(file).iter_messages()]
     assert (settings.topics.odometry, "nav_msgs/msg/Odometry") in found
+    assert (settings.topics.detections, "vision_msgs/msg/Detection2DArray") in found

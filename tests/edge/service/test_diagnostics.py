@@ -6,7 +6,7 @@ from drivers.clock import ClockState
 from drivers.driver import SensorHealth, SensorState, StreamHealth
 from drivers.messages import QUALITY_NAMES, FixQuality
 from edge.control.codec import decode, encode
-from edge.control.messages import Status
+from edge.control.messages import Detecting, Status
 from edge.recording.account import RecordingStatus, TopicDrops
 from edge.recording.messages import DiagnosticStatus, Level
 from edge.service.diagnostics import SystemClock, diagnostics
@@ -63,6 +63,14 @@ def test_each_part_has_its_level_and_its_figures() -> None:
     assert told["host"].message == "slowed down by cpufreq-cpu0"
     assert dict(told["host/clock"].values)["utc_minus_monotonic_ns"] == "77"
     assert dict(told["recorder"].values)["dropped./livox/lidar"] == "4"
+
+
+def test_the_detector_is_in_the_file_with_the_model_it_uses() -> None:
+    detecting = Detecting("failed", "ailanthus", "ab12", "cuda", 1.5, 180.0, 3, 40, 560, "out of memory")
+    clock = SystemClock(77, 2, Discipline(False, ""))
+    told = diagnostics(5, (HEALTH,), SAMPLE, clock, None, detecting=detecting).statuses[-1]
+    assert (told.name, told.level, told.message) == ("pipeline/detection", Level.ERROR, "out of memory")
+    assert dict(told.values)["sha256"] == "ab12"
 
 
 def test_every_quality_has_a_name() -> None:

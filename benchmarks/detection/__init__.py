@@ -1,0 +1,1 @@
+"""What the detector costs beyond the network it runs."""
