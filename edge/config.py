@@ -11,6 +11,7 @@ from drivers import registry
 from edge import toml_table
 from edge.errors import ConfigError
 from pipeline.gnss.config import FusionConfig
+from pipeline.grounding.config import GroundingConfig
 from pipeline.odometry.config import OdometryConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -153,6 +154,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     topics: Topics = Topics()
     odometry: OdometryConfig = OdometryConfig()
     fusion: FusionConfig = FusionConfig()
+    grounding: GroundingConfig = GroundingConfig()
     products: Products = Products()
     detection: Detection = Detection()
     bus: Bus = Bus()

@@ -20,12 +20,13 @@ from edge.process.odometry_stage import OdometryFacts, OdometryStage
 from edge.process.products_stage import ProductFacts, ProductsStage
 from edge.process.watch import Watch
 from edge.replay.replay import Replay, ReplayOptions
+from edge.replay.rig import camera_rig, recorded_calibration
 from edge.validation.files import recording_files
 
 if TYPE_CHECKING:  # heavy: OpenCV
     from pipeline.detection.detector import Detector
 
-STAGES = ("odometry", "fusion", "detection", "products")
+STAGES = ("odometry", "fusion", "detection", "grounding", "products")
 ANTENNA = "antenna.json"
 """Where the recording says the antenna is: the fusion does not open it again."""
 _FORMAT = 1
@@ -70,7 +71,7 @@ class Done:
 def process(
     task: Task, config: Config, watch: Watch | None = None, load: Callable[[], Estimators] = estimators
 ) -> Done:
-    """Odometry, fusion, detection where a model is configured, products.
+    """Odometry, fusion; detection and grounding where a model is configured; products.
 
     FormatError for what cannot be used, EdgeError where nothing could be estimated, DetectionError for a wrong model.
     """
@@ -104,6 +105,9 @@ class _Work:
         self._stage("fusion", fusion, self._fusion)
         if detection:
             self._stage("detection", detection, self._detection)
+            grounding = key_of(odometry, detection, self.config.grounding)
+            self._stage("grounding", grounding, self._grounding)
+            detection = grounding
         last = key_of(fusion, detection, self.task.session)
         self._stage("products", last, self._products, [self.task.folder / "products.json"])
         facts = msgspec.json.decode((self.task.folder / "products.json").read_bytes(), type=ProductFacts)
@@ -162,6 +166,16 @@ class _Work:
 
         assert self.detector is not None
         DetectionStage(self.task.targets, self.config, self.detector).run(folder, self.watch.advance)
+
+    def _grounding(self, folder: Path) -> None:
+        from edge.process.grounding_stage import GroundingStage  # noqa: PLC0415
+
+        replay = Replay(self.task.targets, self.config, self.task.replay)
+        calibration = recorded_calibration(replay.facts, self.config.calibration)
+        rig = camera_rig(calibration, replay.static_transforms, self.config.calibration)
+        work, tile_m = self.checkpoint.folder, self.config.products.tile_m
+        stage = GroundingStage(work / "odometry", work / "detection", rig, tile_m, self.config.grounding)
+        stage.run(folder, self.watch.advance)
 
     def _products(self, _folder: Path) -> None:
         software = f"mapforest {__version__}"
