@@ -11,8 +11,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from drivers.sim.payload import Payload, PayloadConfig
 from drivers.sim.scenarios import WorldConfig
@@ -20,6 +21,7 @@ from drivers.sim.world import build
 from edge import toml_table
 from edge.control.client import ControlClient
 from edge.control.messages import Request, Status, Verdict
+from edge.detection import DEMO, DEMO_MODEL
 from edge.errors import ControlError, EdgeError
 
 UP_S = 60.0
@@ -78,12 +80,14 @@ def prepare(stage: Stage, payload: PayloadConfig) -> None:
     """Write the recorder's configuration."""
     stage.folder.mkdir(parents=True, exist_ok=True)
     # Small enough a reserve to run on a laptop's disk; everything else is as on the payload.
-    table = {
+    table: dict[str, dict[str, Any]] = {
         "recording": {"folder": str(stage.folder / "recordings"), "min_free_mib": 256, "min_free_percent": 0.5},
         "mission": {"name": "demo", "carrier": payload.world.carrier},
         "control": {"socket": str(stage.socket)},
         "sensors": payload.driver_tables(),
     }
+    if DEMO_MODEL.exists() and find_spec("onnxruntime") is not None:
+        table["detection"] = {"model": DEMO}
     stage.config.write_text(toml_table.render(table), encoding="utf-8")
 
 

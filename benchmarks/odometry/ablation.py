@@ -55,9 +55,10 @@ def _with_dust() -> None:
 
 VARIANTS = (
     Variant("as it is"),
-    Variant("point to plane", {"match.directions": 1}),
-    Variant("point to point (voxel means)", {"match.prior_points": NEVER, "match.prior": 0.002, "match.wide": NEVER}),
-    Variant("whole Gaussians (NDT): wide directions count too", {"match.wide": NEVER}),
+    Variant("the two thinnest directions", {"match.directions": 2}),
+    Variant("whole Gaussians: all directions thinner than the voxel", {"match.directions": 3}),
+    Variant("point to point (voxel means)", {"match.directions": 3, "match.prior_points": NEVER, "match.wide": NEVER}),
+    Variant("wide ones count too", {"match.wide": NEVER}),
     Variant("shapes as measured, no prior for few points", {"match.prior_points": 0.0}),
     Variant("one voxel from all sides", {"map.sides": 1}),
     Variant("fine grid alone", {"map.sizes_m": (0.3,)}),

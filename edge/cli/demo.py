@@ -79,6 +79,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(console, poses)
         _conclude(console, folder, verdict, reports)
+        if (found := done.facts.detection) is not None:
+            counted = f"{found.boxes} boxes in {found.images} images, by {found.model.name}"
+            console.print(f"detection   {counted} (for demonstration only)", highlight=False)
         console.print(f"products    {done.folder}", highlight=False)
         for name, meaning in done.facts.files.items():
             console.print(f"            {name}  {meaning}", highlight=False)

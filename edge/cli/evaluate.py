@@ -25,35 +25,54 @@ example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth --page plots.html
          mapforest evaluate trajectory estimate.tum --truth truth.tum --over 50
+         mapforest evaluate detection models/ailanthus.onnx datasets/autumn --page curves.html --worst worst.jpg
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
 trajectory: what `mapforest process` made of a session and what the live pipeline recorded in it, or a TUM file, against
 the emulated payload's truth or another TUM file in the same time: APE and RPE (as in evo) as it is, and laid over the
 truth by yaw or in all axes; NEES (1 is honest). Live and offline are compared on the Earth: how far they are apart, and
-whether their covariances allow for that."""
+whether their covariances allow for that.
+detection: an ONNX model ("demo" for ours), or a folder of another program's predictions (YOLO texts with confidences),
+against a folder with images/, labels/, classes.txt and, to be told by site, sites.csv (image,site): precision, recall
+and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("what", choices=["clocks", "trajectory"], help="what to evaluate")
-    parser.add_argument("session", type=Path, help="session folder; trajectory: also products, or a TUM file")
+    parser.add_argument("what", choices=["clocks", "trajectory", "detection"], help="what to evaluate")
     parser.add_argument(
-        "--truth", type=Path, required=True, metavar="PATH", help="folder that the emulated payload wrote, or TUM file"
+        "estimate",
+        type=Path,
+        help="session folder; trajectory: also products, or a TUM file; detection: a model, or predictions",
+    )
+    parser.add_argument("dataset", type=Path, nargs="?", help="detection: labelled images")
+    parser.add_argument(
+        "--truth", type=Path, metavar="PATH", help="of the others: folder that the emulated payload wrote, or TUM file"
     )
     parser.add_argument(
         "--settle", type=float, default=10.0, metavar="S", help="clocks: leave out this much of an epoch"
     )
     parser.add_argument("--over", type=float, default=100.0, metavar="M", help="trajectory: stretches of the RPE")
-    parser.add_argument("--page", type=Path, metavar="FILE", help="trajectory: also write plots, as one HTML page")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="also write plots, as one HTML page (not of clocks)")
+    parser.add_argument("--worst", type=Path, metavar="FILE", help="detection: the worst images in one JPEG or PNG")
+    parser.add_argument(
+        "--confidence", type=float, metavar="C", help="detection: of the operating point (detection.confidence)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
+    if args.what == "detection":
+        from edge.cli import detections
+
+        return detections.run(args)
+    if args.truth is None or args.dataset is not None:
+        raise UsageError(f"evaluate {args.what}: give one session, and its truth with --truth")
     if args.what == "trajectory":
         return _trajectory(args)
     if args.page is not None:
-        raise UsageError("--page: there are plots of trajectories only; `mapforest evaluate trajectory`")
-    reports = clock_reports(args.session, args.truth, args.settle)
+        raise UsageError("--page: there are plots of trajectories and of detections only")
+    reports = clock_reports(args.estimate, args.truth, args.settle)
     if args.json:
         print(msgspec.json.encode(reports).decode())
     else:
@@ -66,10 +85,10 @@ def _trajectory(args: argparse.Namespace) -> int:
     from edge.process.against_truth import find_pairs
     from pipeline.evaluation.pair import compare
 
-    pairs = find_pairs(args.session, args.truth, load(args.config))
+    pairs = find_pairs(args.estimate, args.truth, load(args.config))
     found = compare(pairs, args.over)
     if args.page is not None:
-        _write_page(args.page, args.session, pairs)
+        _write_page(args.page, args.estimate, pairs)
     if args.json:
         print(msgspec.json.encode(found).decode())
     else:

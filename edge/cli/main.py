@@ -32,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("edge.cli.info", "topics, types, counts and rates of a recording"),
     "process": ("edge.cli.process", "odometry, GNSS fusion, detection and products from a recording"),
     "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
+    "dataset": ("edge.cli.dataset", "training data from recordings and photos, and a model from them"),
     "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }
 """command -> (module with HELP, add_arguments and run; summary). Import strings: `status` must not load numba."""

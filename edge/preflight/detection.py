@@ -37,7 +37,7 @@ def check_detection(config: Config) -> list[Check]:
 def _pace(detector: Detector, image_s: float, config: Config) -> Check:
     settings, info = config.detection, detector.info
     found = f"{info.name} (sha256 {info.sha256[:12]}) on {info.device}: {1e3 * image_s:.0f} ms an image"
-    affordable_hz = settings.core_share / image_s
+    affordable_hz = settings.core_share / (image_s * max(settings.threads, 1))
     if info.device != "cpu" or affordable_hz >= settings.rate_hz:
         return Check(SUBJECT, Outcome.GOOD, found)
     found += f", {affordable_hz:.1f} a second live instead of {settings.rate_hz:g}"

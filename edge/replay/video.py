@@ -46,7 +46,7 @@ class VideoTally:
         if self.damaged:
             said.append(f"{self.damaged} damaged frames in the video")
         if self.orphans:
-            said.append(f"{self.orphans} frames of the video lean on missing or damaged ones and were left out")
+            said.append(f"{self.orphans} frames of the video left out: before a first key frame, after holes or damage")
         return tuple(said)
 
 
@@ -113,7 +113,8 @@ class LazyDecoder:
                 break
         return frames
 
-    def _decoded(self, packet: av.Packet[Any] | None) -> list[Frame]:
+    def _decoded(self, packet: Any) -> list[Frame]:
+        """packet: an `av.Packet`, None at the end."""
         try:
             found = self._codec.decode(packet)
         except av.error.FFmpegError:

@@ -15,7 +15,7 @@ from pipeline.detection.card import Card, read_card
 from pipeline.detection.decode import Found, decode, suppress
 from pipeline.detection.errors import DetectionError, InferenceFailed, ModelForeign
 from pipeline.detection.layout import BOX, Layout, find_layout
-from pipeline.detection.letterbox import PAD, Letterbox, snug
+from pipeline.detection.letterbox import PAD, Fit, Letterbox, snug
 from pipeline.detection.runtime import Device, Session, sha256
 from pipeline.detections import FrameDetections
 
@@ -94,14 +94,21 @@ class Detector:
         box = self._letterbox((height, width))
         where = box.put(image_bgr)
         found = decode(self._run(box.blob), self.info.layout, self._settings.confidence)
-        if self.info.layout is not Layout.FINAL:
-            found = suppress(found, self._settings.iou, self._settings.most)
-        found = _inside(Found(where.undo(found.boxes), found.confidence, found.class_id))
-        if len(found.class_id) and not 0 <= found.class_id.min() <= found.class_id.max() < len(self.info.class_names):
-            raise InferenceFailed(f"class {found.class_id.max()} of {len(self.info.class_names)}: not in its names")
+        if len(found.boxes):
+            found = self._finished(found, where)
         return FrameDetections(
             stamp_ns, width, height, found.boxes, found.confidence, found.class_id, self.info.class_names
         )
+
+    def _finished(self, found: Found, where: Fit) -> Found:
+        """Each thing once, in pixels of the image."""
+        if self.info.layout is not Layout.FINAL:
+            found = suppress(found, self._settings.iou, self._settings.most)
+        found = _inside(Found(where.undo(found.boxes), found.confidence, found.class_id))
+        names = len(self.info.class_names)
+        if len(found.class_id) and not 0 <= found.class_id.min() <= found.class_id.max() < names:
+            raise InferenceFailed(f"class {found.class_id.max()} of {names}: not in its names")
+        return found
 
     def time_s(self, image_px: tuple[int, int], rounds: int = 3) -> float:
         """Least of some rounds on grey images of that height and width: what an image costs here. Also a warm-up."""

@@ -122,7 +122,10 @@ def _providers(available: Sequence[str], device: Device, cache: Path | None) -> 
 def _options(device: str, cache: Path | None) -> dict[str, str]:
     if device != "tensorrt" or cache is None:
         return {}
-    cache.mkdir(parents=True, exist_ok=True)
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RuntimeMissing(f"{cache}: cannot be made ({error.strerror}); set detection.cache") from error
     folder = str(cache)
     return {
         "trt_fp16_enable": "True",

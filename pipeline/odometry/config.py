@@ -57,8 +57,9 @@ class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     prior: float = 0.0278
     """Variance, likewise, that a voxel of few points is taken to have, with the weight of `prior_points`."""
     prior_points: float = 3.0
-    directions: int = 3
-    """So many of a voxel's directions are used, the thinnest first; 1: point to plane."""
+    directions: int = 1
+    """So many of a voxel's directions are used, the thinnest first. 1: point to plane, the plane with a thickness; with
+    the others the drift is a third more, since along a surface the middle of what was seen is no place on the tree."""
     effective: float = 300.0
     """So many residuals a scan count as independent."""
     least_share: float = 0.15

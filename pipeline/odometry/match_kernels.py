@@ -1,7 +1,7 @@
 """Residuals of a scan's clusters against the voxels, summed to normal equations of the pose.
 
-A voxel's Gaussian decides by itself what it constrains: a plane one direction, a thin stem two, a twig three.
-A direction as wide as the voxel is cut by it, says nothing about motion and is left out.
+A voxel's Gaussian decides by itself how much it constrains: its thinnest direction counts by how thin it is. One as
+wide as the voxel is cut by it, says nothing about motion and is left out.
 """
 
 from __future__ import annotations

@@ -22,6 +22,9 @@ svg{width:100%;height:auto;display:block}svg.narrow{display:none}
 @media(max-width:640px){svg.narrow{display:block}svg.wide{display:none}h1{font-size:1.2rem}}
 text{fill:var(--soft);font-size:11px}.grid{stroke:var(--rule);stroke-width:1}
 .line{fill:none;stroke-width:1.6;stroke-linejoin:round}.dots{fill:none;stroke-width:4;stroke-linecap:round}
+table{border-collapse:collapse;margin:10px 0;font-variant-numeric:tabular-nums}.wide-table{overflow-x:auto}
+th,td{padding:3px 14px 3px 0;text-align:right;border-bottom:1px solid var(--rule)}
+th:first-child,td:first-child{text-align:left}th{color:var(--soft);font-weight:normal}
 .a{stroke:var(--a)}.b{stroke:var(--b)}.c{stroke:var(--c)}.band{fill:var(--band)}ul{color:var(--soft);padding-left:1.2em}
 """
 
@@ -54,6 +57,14 @@ def figure(title: str, plot: Plot, caption: str = "") -> str:
     """A plot, drawn for wide and for narrow screens: scaled down to a phone its letters would be 4 px high."""
     drawn = "\n".join(plot.svg(width, name) for name, width in (("wide", WIDE), ("narrow", NARROW)))
     return f"<h3>{escape(title)}</h3>\n{words(caption) if caption else ''}{drawn}"
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> str:
+    """Figures in rows; the first column names them."""
+    head = "".join(f"<th>{escape(column)}</th>" for column in columns)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    told = words(caption) if caption else ""
+    return f'<h3>{escape(title)}</h3>\n{told}<div class="wide-table"><table><tr>{head}</tr>{body}</table></div>'
 
 
 def notes(sentences: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from drivers.gopro.references import References
 from tests.edge.replay import videos
 
 WITH_PYRAMID = {"x264-params": "annexb=1:repeat-headers=1:scenecut=0:b-adapt=0:bframes=3:b-pyramid=normal:ref=3"}
-HIGH_444 = {"x264-params": "annexb=1:repeat-headers=1:keyint=10", "profile": "high444"}
+WITH_SCALING = {"preset": "medium", "x264-params": "annexb=1:repeat-headers=1:keyint=10:cqm=jvt"}
 
 
 def misses(units) -> list[int]:
@@ -18,7 +18,7 @@ def misses(units) -> list[int]:
     return [index for index, unit in units if references.miss(unit)]
 
 
-@pytest.mark.parametrize("options", [None, videos.REORDERED, WITH_PYRAMID, HIGH_444, {"preset": "slow"}])
+@pytest.mark.parametrize("options", [None, videos.REORDERED, WITH_PYRAMID, WITH_SCALING, {"preset": "slow"}])
 def test_a_whole_stream_misses_nothing(options):
     assert misses(videos.units(80, options)) == []
 

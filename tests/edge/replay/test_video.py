@@ -59,7 +59,7 @@ def test_a_stream_that_begins_in_the_middle_waits_for_its_key_frame():
     frames, decoder = read(videos.units(35)[4:])
     assert indices(frames) == list(range(10, 35))
     assert decoder.tally.orphans == 6
-    assert "6 frames of the video lean on missing" in decoder.tally.told[0]
+    assert "6 frames of the video left out" in decoder.tally.told[0]
 
 
 @pytest.mark.parametrize(

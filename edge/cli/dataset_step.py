@@ -1,0 +1,52 @@
+"""What the steps of `mapforest dataset` have in common."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+
+import msgspec
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from edge.cli.words import console
+
+Step = tuple[str, Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]
+"""What it does in a line, its options, and how it is done."""
+_NAMED = 3
+
+
+def tell(args: argparse.Namespace, report: object, lines: Sequence[str]) -> None:
+    """The report as JSON for programs, or lines for people; empty ones are left out."""
+    if args.json:
+        print(msgspec.json.encode(report).decode())
+        return
+    out = console()
+    for line in lines:
+        if line:
+            out.print(escape(line), highlight=False)
+
+
+def some(count: int, what: str) -> str:
+    """A line about so many; nothing about none."""
+    return f"  {what}: {count:,}" if count else ""
+
+
+def named(names: Sequence[str], what: str) -> str:
+    """The same with the first few names."""
+    shown = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+    return f"  {what}: {len(names):,} ({shown})" if names else ""
+
+
+def table(columns: Sequence[str]) -> Table:
+    """The first column to the left, figures to the right."""
+    made = Table(box=None, padding=(0, 1), header_style="bold")
+    for number, column in enumerate(columns):
+        made.add_column(column, justify="right" if number else "left", no_wrap=True)
+    return made
+
+
+def out() -> Console:
+    """For tables."""
+    return console()

@@ -1,0 +1,1 @@
+"""Data for training on the disk: out of recordings, Label Studio and iNaturalist, into a model."""
