@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -21,8 +21,6 @@ from pipeline.grounding.sources import TilePoints
 from pipeline.grounding.views import CameraRig, CameraView, Pose, camera_view
 from pipeline.products.track import read_track
 
-SAME_SHAPE = 0.01
-"""Images of another shape than the calibrated ones are of another lens mode."""
 POINTS_M = 0.1
 """One point in a cube of this size shows what hides what."""
 
@@ -90,11 +88,8 @@ class GroundingStage:
         if not 0 < after < len(track):
             return None
         before, behind = (_pose(track[k]) for k in (after - 1, after))
-        lens = self.rig.model
-        if abs(frame.width_px * lens.height_px / (frame.height_px * lens.width_px) - 1.0) > SAME_SHAPE:
-            return None
-        lens = lens.resized(frame.width_px, frame.height_px)
-        return camera_view(frame.stamp_ns, before, behind, replace(self.rig, model=lens))
+        rig = self.rig.for_images(frame.width_px, frame.height_px)
+        return camera_view(frame.stamp_ns, before, behind, rig) if rig is not None else None
 
 
 def _pose(record: np.void) -> Pose:

@@ -17,8 +17,8 @@ from pipeline.detections import FrameDetections
 from pipeline.grounding.config import GroundingConfig
 from pipeline.grounding.depth import DepthImage
 from pipeline.grounding.evidence import Evidence
-from pipeline.grounding.hypotheses import Hypotheses
-from pipeline.grounding.likelihood import hit, miss
+from pipeline.grounding.hypotheses import Hypotheses, Hypothesis
+from pipeline.grounding.likelihood import hit, log_odds, miss
 from pipeline.grounding.sighting import Sighting, sight
 from pipeline.grounding.summary import tree_of
 from pipeline.grounding.surroundings import Neighbourhood, PointSource, Surroundings
@@ -46,6 +46,7 @@ class Grounding:
         self.counts = Counts()
         self.evidence = Evidence(config.voxel_m, config.evidence.most_log_odds) if by_point else None
         self._hypotheses = Hypotheses(config)
+        self._source = source
         self._neighbourhood = Neighbourhood(source, config.farthest_m)
         self._anchored: Surroundings | None = None
         self._last_m: Array | None = None
@@ -70,11 +71,15 @@ class Grounding:
         missing = len(boxes) - len(sightings)
         self.counts = Counts(counts.views + 1, counts.blind, counts.boxes + len(boxes), counts.unplaced + missing)
 
+    def probable(self) -> list[Hypothesis]:
+        """Those that are more probable than not, without what takes longer to say of them."""
+        return [one for one in self._hypotheses.pointed_at() if one.log_odds > log_odds(self.config.probable)]
+
     def trees(self) -> list[Tree]:
         """All that were ever pointed at, the most probable first, also those that later views spoke against."""
         name = self.config.target
         return [
-            tree_of(one, number, name, self._neighbourhood, self.evidence)
+            tree_of(one, number, name, self._source, self.evidence)
             for number, one in enumerate(self._hypotheses.pointed_at(), 1)
         ]
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -118,9 +118,9 @@ class Hypotheses:
 
     def pointed_at(self) -> list[Hypothesis]:
         """Those that a box ever meant, the most probable first; what boxes alone point at joins the stem it means."""
-        stems = [one for one in self if one.hits and one.layers > 0.0]
-        free = sorted((one for one in self if one.hits and one.layers == 0.0), key=lambda one: -one.log_odds)
-        kept = list(stems)
+        hit = [replace(one, best=list(one.best)) for one in self if one.hits]  # what is merged here goes on apart
+        free = sorted((one for one in hit if one.layers == 0.0), key=lambda one: -one.log_odds)
+        kept = [one for one in hit if one.layers > 0.0]
         for one in free:
             twin = min(kept, key=lambda other: self._squared(one, other), default=None)
             if twin is not None and self._squared(one, twin) < self._config.gate:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from pipeline.grounding.evidence import Evidence
 from pipeline.grounding.hypotheses import Hypothesis
 from pipeline.grounding.likelihood import probability
-from pipeline.grounding.surroundings import Neighbourhood, Surroundings
+from pipeline.grounding.surroundings import PointSource, Surroundings
 from pipeline.trees import Tree
 
 Array = npt.NDArray[np.float64]
@@ -16,12 +16,12 @@ NEAR_SIDE_M = 0.35
 """Without a stem the place is that of what was seen, mostly from one side."""
 BASE_SIGMA_M = 0.15
 CROWN_M = 4.0
+AROUND_M = 14.0
+"""From the camera's height: a tall crown's top is in it."""
 LEAST_POINTS = 20
 
 
-def tree_of(
-    one: Hypothesis, number: int, class_name: str, neighbourhood: Neighbourhood, evidence: Evidence | None
-) -> Tree:
+def tree_of(one: Hypothesis, number: int, class_name: str, source: PointSource, evidence: Evidence | None) -> Tree:
     """In `odom`. The covariance holds the place within the map at hand, not that of the map."""
     mean_range_m = one.ranges_m / max(one.hits, 1)
     lasting_m = float(np.hypot(one.lasting_rad * mean_range_m, one.lasting_m))
@@ -29,7 +29,9 @@ def tree_of(
     covariance = one.covariance + (lasting_m**2 if one.layers == 0.0 else 0.0) * np.eye(2)
     if one.layers == 0.0:
         covariance = covariance + NEAR_SIDE_M**2 * np.eye(2)
-    around = neighbourhood.at(np.array([*one.mean_m, one.height_m]))
+    place = np.array([*one.mean_m, one.height_m])
+    near = source.around(place, AROUND_M)
+    around = Surroundings.of(place, near) if len(near) else None
     base_m, points, height_m, crown_m = one.height_m, 0, np.nan, np.nan
     if around is not None:
         base_m = float(around.ground.at(one.mean_m[None])[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.camera import CameraModel
 
 Array = npt.NDArray[np.float64]
+SAME_SHAPE = 0.01
 FARTHEST_APART_NS = 300_000_000
 """Between two poses farther apart than this nothing is interpolated."""
 
@@ -29,6 +30,13 @@ class CameraRig:
     rotation_sigma_rad: float = 0.0175
     position_sigma_m: float = 0.02
     time_sigma_s: float = 0.02
+
+    def for_images(self, width_px: int, height_px: int) -> CameraRig | None:
+        """The same for images of another size; None for another shape, which is another lens mode."""
+        model = self.model
+        if abs(width_px * model.height_px / (height_px * model.width_px) - 1.0) > SAME_SHAPE:
+            return None
+        return replace(self, model=model.resized(width_px, height_px))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
