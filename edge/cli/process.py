@@ -17,7 +17,7 @@ from edge.config import load
 from edge.errors import UsageError
 
 if TYPE_CHECKING:  # heavy: numpy, numba
-    from edge.process.products_stage import ProductFacts
+    from edge.process.product_facts import ProductFacts
     from edge.replay.geometry import Matrix
 
 HELP = """odometry, GNSS fusion and products from a recording, faster than real time

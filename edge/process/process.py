@@ -16,7 +16,8 @@ from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
 from edge.process.estimators import Estimators, estimators, fusion_config, odometry_config
 from edge.process.fusion_stage import FusionStage
 from edge.process.odometry_stage import OdometryFacts, OdometryStage
-from edge.process.products_stage import ProductFacts, ProductsStage
+from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
+from edge.process.products_stage import ProductsStage
 from edge.process.watch import Watch
 from edge.replay.replay import Replay, ReplayOptions
 from edge.validation.files import recording_files
@@ -24,7 +25,7 @@ from edge.validation.files import recording_files
 STAGES = ("odometry", "fusion", "products")
 ANTENNA = "antenna.json"
 """Where the recording says the antenna is: the fusion does not open it again."""
-_FORMAT = 1
+_FORMAT = 2
 """Of the files between the stages."""
 
 
@@ -90,19 +91,19 @@ class _Work:
         keys = self._keys()
         self._stage("odometry", keys[0], self._odometry)
         self._stage("fusion", keys[1], self._fusion)
-        self._stage("products", keys[2], self._products, [self.task.folder / "products.json"])
-        facts = msgspec.json.decode((self.task.folder / "products.json").read_bytes(), type=ProductFacts)
-        return Done(self.task.folder, facts, tuple(self.redone))
+        self._stage("products", keys[2], self._products, [self.task.folder / PRODUCTS_JSON])
+        return Done(self.task.folder, read_facts(self.task.folder), tuple(self.redone))
 
     def _keys(self) -> tuple[str, str, str]:
         options = self.task.replay
         pose = None if options.lidar_pose is None else options.lidar_pose.tolist()
         wanted = options.wanted
         asked = [wanted.lidar, wanted.imu, wanted.fix, options.time_field, pose, self.task.gnss]
-        settings = [self.config.odometry, self.config.products, self.config.topics, self.config.calibration]
+        tiles = (self.config.products.voxel_m, self.config.products.tile_m)
+        settings = [self.config.odometry, tiles, self.config.topics, self.config.calibration]
         first = key_of(_FORMAT, __version__, self.prints, asked, settings)
         second = key_of(first, self.config.fusion)
-        return first, second, key_of(second, self.task.session)
+        return first, second, key_of(second, self.config.products, self.task.session)
 
     def _stage(self, name: str, key: str, run: Callable[[Path], object], outputs: Sequence[Path] = ()) -> None:
         done = self.checkpoint.done(name, key, outputs)
@@ -128,10 +129,10 @@ class _Work:
 
     def _products(self, _folder: Path) -> None:
         software = f"mapforest {__version__}"
-        voxel_m = self.config.products.voxel_m
-        ProductsStage(self.checkpoint.folder, self.task.folder, voxel_m, self.task.session, software).run(
-            self.watch.advance
+        stage = ProductsStage(
+            self.checkpoint.folder, self.task.folder, self.config.products, self.task.session, software
         )
+        stage.run(self.watch.advance)
 
 
 def clean(task: Task) -> None:

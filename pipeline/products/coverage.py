@@ -32,6 +32,10 @@ class Sampled:
     probability: npt.NDArray[np.float32]
     sigma_m: npt.NDArray[np.float32]
 
+    def reshaped(self, *shape: int) -> Sampled:
+        """The same as a picture."""
+        return Sampled(self.views.reshape(shape), self.probability.reshape(shape), self.sigma_m.reshape(shape))
+
 
 class CoverageGrid:
     """Square cells in the frame of the trees, in blocks that exist where something was seen. Not thread-safe."""

@@ -1,0 +1,122 @@
+"""What a detector found becomes files, on the Earth or local, and `products.json` tells of each."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import laspy
+import msgspec
+import numpy as np
+import pyogrio
+import pytest
+import rasterio
+
+from edge.config import Config, Products
+from edge.errors import EdgeError
+from edge.process.process import Task, process
+from edge.process.products_stage import ProductsStage
+from pipeline.products.findings import PointEvidence
+from tests.edge.process.test_process import fakes
+from tests.pipeline.products import stand
+
+ON_EARTH = {
+    "findings.gpkg",
+    "findings.geojson",
+    "findings.qml",
+    "findings.kml",
+    "findings.kmz",
+    "findings_imapinvasives.csv",
+    "findings_darwin_core.csv",
+    "evidence.tif",
+    "evidence.qml",
+    "DCIM",
+}
+LOCAL = {"findings_local.gpkg", "findings_local.csv", "DCIM"}
+
+
+def hot(_tile, points):
+    seen = np.ones(len(points), np.uint16)
+    return PointEvidence(np.full(len(points), 0.25, np.float32), np.zeros(len(points), np.uint8), seen)
+
+
+def found(folder, frame="map"):
+    folder.mkdir()
+    given = stand.findings(folder, evidence=hot)
+    return replace(given, frame=frame, trees=[replace(tree, frame=frame) for tree in given.trees])
+
+
+def hand_out(recording, findings, *, gnss=True, **settings):
+    done = process(Task([recording], gnss=gnss), Config(), load=fakes())
+    config = msgspec.structs.replace(Products(), **settings)
+    stage = ProductsStage(done.folder / "work", done.folder, config, "walk", "mapforest", findings)
+    return done.folder, stage.run(lambda _: None)
+
+
+def names(folder):
+    return {path.name for path in folder.iterdir()} - {"work", "products.json"}
+
+
+def test_findings_are_handed_out_in_every_format(recording, tmp_path):
+    folder, facts = hand_out(recording, found(tmp_path / "given"), observer="A. Walker")
+    assert names(folder) == set(facts.files)
+    assert set(facts.files) >= ON_EARTH
+    assert not (LOCAL - {"DCIM"}) & set(facts.files)
+    told = facts.findings
+    assert (told.trees, told.patches, told.images, told.model) == (3, 2, 1200, "toh-yolo")
+    assert told.searched_m2 == pytest.approx(2400, rel=0.02)
+    cloud = laspy.read(folder / "map.laz")
+    assert set(np.array(cloud.heat)) == {0.25}
+    meta, _, _, fields = pyogrio.raw.read(folder / "findings.gpkg", layer="detections")
+    rows = dict(zip(meta["fields"], fields, strict=True))
+    assert rows["observer"].tolist() == ["A. Walker"] * 3
+    assert all((folder / crop).stat().st_size > 1000 for crop in rows["crop"] if crop)
+    with rasterio.open(folder / "evidence.tif") as raster:
+        assert raster.crs.to_epsg() == 32632
+        assert "nobody has verified" in raster.tags()["warning"]
+
+
+def test_a_session_without_a_place_gets_local_files_that_say_so(recording, tmp_path):
+    folder, facts = hand_out(recording, found(tmp_path / "given", "odom"), gnss=False)
+    assert names(folder) == set(facts.files)
+    assert set(facts.files) >= LOCAL
+    assert not {name for name in facts.files if name.endswith((".kml", ".kmz", ".tif", ".geojson"))}
+    assert facts.georeference is None
+    assert all("no place on the Earth" in facts.files[name] for name in LOCAL - {"DCIM"})
+    assert "heat" in laspy.read(folder / "map_local.laz").point_format.extra_dimension_names
+
+
+def test_trees_in_another_frame_are_refused(recording, tmp_path):
+    with pytest.raises(EdgeError, match="do the grounding again"):
+        hand_out(recording, found(tmp_path / "given", "odom"))
+
+
+def test_without_a_detector_there_are_none_of_them_and_old_ones_go(recording, tmp_path):
+    folder, _ = hand_out(recording, found(tmp_path / "given"))
+    stage = ProductsStage(folder / "work", folder, Products(), "walk", "mapforest")
+    facts = stage.run(lambda _: None)
+    assert names(folder) == set(facts.files)
+    assert not ON_EARTH & set(facts.files)
+    assert facts.findings is None
+    assert list(laspy.read(folder / "map.laz").point_format.extra_dimension_names) == ["sweep", "sigma_m"]
+
+
+def test_nothing_found_is_handed_out_too(recording, tmp_path):
+    _, facts = hand_out(recording, replace(found(tmp_path / "given"), trees=()))
+    assert set(facts.files) >= ON_EARTH - {"DCIM"}
+    assert (facts.findings.trees, facts.findings.infested_m2) == (0, 0.0)
+
+
+@pytest.mark.parametrize(("geoid", "undulation"), [(-33.5, -33.5), ("none", None), ("receiver", None)])
+def test_the_reference_is_told(recording, tmp_path, geoid, undulation):
+    folder, _ = hand_out(recording, found(tmp_path / "given"), geoid=geoid)
+    told = json.loads((folder / "products.json").read_text())["georeference"]
+    assert (told["epsg"], told["undulation_m"]) == (32632, undulation)
+    assert told["convergence_deg"] == pytest.approx(
+        math.degrees(math.radians(-1.0) * math.sin(math.radians(47))), rel=1e-3
+    )
+    assert ("orthometric = ellipsoidal" in told["heights"]) == (undulation is not None)
+    with laspy.open(folder / "map.laz") as cloud:
+        about = next(vlr for vlr in cloud.header.vlrs if vlr.record_id == 3)
+    assert told["heights"].encode() in about.record_data
