@@ -46,9 +46,9 @@ def _on_the_earth(shelf: Shelf, handout: Handout, walk: Walk) -> None:
     assert site is not None
     with shelf.put("findings.gpkg", f"{LAYERS}, for QGIS, QField and ArcGIS") as path:
         _geopackage(path, handout, walk)
-    with shelf.put("findings.geojson", "detections in WGS 84 (RFC 7946)") as path:
+    with shelf.put("detections.geojson", "detections in WGS 84 (RFC 7946)") as path:
         write_geojson(path, handout.rows, handout.survey.session)
-    with shelf.put("findings.qml", "how QGIS draws findings.geojson") as path:
+    with shelf.put("detections.qml", "how QGIS draws detections.geojson") as path:
         path.write_text(detections_style(), encoding="utf-8")
     with shelf.put("findings.kml", "detections, patches, searched area and track, for Google Earth") as path:
         write_findings_kml(path, handout)

@@ -24,6 +24,8 @@ from pipeline.products.styles import layer_style
 Array = npt.NDArray[np.float64]
 _LINE_M = 0.1
 """The line leaves the way by at most this."""
+_VERSION = "1.2"
+"""Of the GeoPackage standard: newer ones make GDAL of two years ago, and what is built on it, warn."""
 _LOCAL = (
     'ENGCRS["local: metres from the start of the session, heading arbitrary",EDATUM["start of the session"],'
     'CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]]'
@@ -91,6 +93,7 @@ def add_styles(path: Path) -> None:
         "useAsDefault": np.ones(len(layers), bool),
         "description": text(["mapforest"] * len(layers)),
         "owner": text([""] * len(layers)),
+        "update_time": np.full(len(layers), np.datetime64("now", "ms")),  # QGIS orders by it
     }
     _write(path, _Layer("layer_styles"), None, columns)
 
@@ -143,5 +146,6 @@ def _write(path: Path, layer: _Layer, shapes: Any, columns: Columns) -> None:
         geometry_type=layer.kind,
         crs=layer.crs,
         append=path.exists(),
+        dataset_options={} if path.exists() else {"VERSION": _VERSION},
         layer_options={"DESCRIPTION": layer.about},
     )

@@ -23,8 +23,8 @@ from tests.pipeline.products import stand
 
 ON_EARTH = {
     "findings.gpkg",
-    "findings.geojson",
-    "findings.qml",
+    "detections.geojson",
+    "detections.qml",
     "findings.kml",
     "findings.kmz",
     "findings_imapinvasives.csv",
