@@ -12,9 +12,10 @@ from rich.markup import escape
 
 from edge.cli import exit_codes
 from edge.cli.stage_bar import StageBar
-from edge.cli.words import console, duration
+from edge.cli.words import console
 from edge.config import load
 from edge.errors import UsageError
+from edge.words import duration
 
 if TYPE_CHECKING:  # heavy: numpy, numba
     from edge.process.product_facts import ProductFacts

@@ -12,6 +12,8 @@ import msgspec
 from edge.errors import FormatError
 
 PRODUCTS_JSON = "products.json"
+REPORT = "report.html"
+"""Made from the products by another command."""
 
 
 class Georeference(msgspec.Struct, frozen=True):

@@ -18,7 +18,7 @@ from edge.process import fusion_stage, odometry_stage
 from edge.process.finding_files import PICTURES, write_finding_files
 from edge.process.fusion_stage import FusionFacts, read_placement
 from edge.process.odometry_stage import OdometryFacts, read_fixes
-from edge.process.product_facts import PRODUCTS_JSON, Georeference, ProductFacts, Shelf, whole
+from edge.process.product_facts import PRODUCTS_JSON, REPORT, Georeference, ProductFacts, Shelf, whole
 from edge.process.way_files import Walk, write_way_files
 from pipeline.products.covariance import pose_table
 from pipeline.products.earth import Site
@@ -51,8 +51,9 @@ MADE = (
     "evidence.tif",
     "evidence.qml",
     PRODUCTS_JSON,
+    REPORT,
 )
-"""Every file this stage may leave behind; those of an earlier run are taken away first."""
+"""Every file this stage may leave behind, and what was made from them: taken away before they are made anew."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,10 +43,11 @@ class Story:
 def write_page(path: Path, story: Story) -> None:
     """Write it."""
     poses = story.poses
+    start_ns = int(poses.stamps_ns[0])
     figures = [sheet.figure("Way from above", way(poses, story.fixes, story.fixes_m))]
-    figures += [sheet.figure(title, plot) for title, plot in (*movement(poses), *certainty(poses))]
+    figures += [sheet.figure(title, plot) for title, plot in (*movement(poses, start_ns), *certainty(poses, start_ns))]
     if story.fixes:
-        figures.append(sheet.figure("GNSS quality", quality(story.fixes, int(poses.stamps_ns[0]))))
+        figures.append(sheet.figure("GNSS quality", quality(story.fixes, start_ns)))
     parts = [sheet.facts(story.facts), *figures, sheet.notes(story.notes)]
     path.write_text(sheet.sheet(story.title, parts), encoding="utf-8")
 
@@ -68,9 +69,9 @@ def fix_dots(fixes: Sequence[GnssFix], fixes_m: Array) -> list[Dots]:
     return [Dots(east[which], north[which], name, tone) for which, name, tone in kinds if which.any()]
 
 
-def movement(poses: PoseTable) -> Iterator[tuple[str, Plot]]:
+def movement(poses: PoseTable, start_ns: int) -> Iterator[tuple[str, Plot]]:
     """Height and speed."""
-    seconds, bands = poses.seconds, degenerate_stretches(poses.seconds, poses.degenerate)
+    seconds, bands = _time(poses, start_ns)
     yield "Height, m", Plot(TIME, "height", [Line(seconds, poses.positions_m[:, 2], "")], bands=bands)
     yield (
         "Speed, m/s",
@@ -78,9 +79,9 @@ def movement(poses: PoseTable) -> Iterator[tuple[str, Plot]]:
     )
 
 
-def certainty(poses: PoseTable) -> Iterator[tuple[str, Plot]]:
+def certainty(poses: PoseTable, start_ns: int) -> Iterator[tuple[str, Plot]]:
     """What the estimators say of themselves."""
-    seconds, bands = poses.seconds, degenerate_stretches(poses.seconds, poses.degenerate)
+    seconds, bands = _time(poses, start_ns)
     sigma = [
         Line(seconds, poses.horizontal_sigma_m, "horizontal"),
         Line(seconds, poses.sigmas[:, 2], "vertical", "c"),
@@ -99,6 +100,12 @@ def quality(fixes: Sequence[GnssFix], start_ns: int) -> Plot:
     rank = {kind: row for row, (_, kinds) in enumerate(_QUALITIES) for kind in kinds}
     rows = np.array([float(rank[fix.quality]) for fix in fixes])
     return Plot(TIME, "quality", dots=[Dots(at, rows, "")], y_names=[name for name, _ in _QUALITIES], height=150)
+
+
+def _time(poses: PoseTable, start_ns: int) -> tuple[Array, list[tuple[float, float]]]:
+    """Seconds (n,), and the stretches to shade."""
+    seconds = (poses.stamps_ns - start_ns) / 1e9
+    return seconds, degenerate_stretches(seconds, poses.degenerate)
 
 
 def degenerate_stretches(seconds: Array, degenerate: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:

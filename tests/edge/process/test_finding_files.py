@@ -7,19 +7,15 @@ import math
 from dataclasses import replace
 
 import laspy
-import msgspec
 import numpy as np
 import pyogrio
 import pytest
 import rasterio
 
-from edge.config import Config, Products
+from edge.config import Products
 from edge.errors import EdgeError
-from edge.process.process import Task, process
 from edge.process.products_stage import ProductsStage
-from pipeline.products.findings import PointEvidence
-from tests.edge.process.test_process import fakes
-from tests.pipeline.products import stand
+from tests.edge.process.handed import found, hand_out
 
 ON_EARTH = {
     "findings.gpkg",
@@ -34,24 +30,6 @@ ON_EARTH = {
     "DCIM",
 }
 LOCAL = {"findings_local.gpkg", "findings_local.csv", "DCIM"}
-
-
-def hot(_tile, points):
-    seen = np.ones(len(points), np.uint16)
-    return PointEvidence(np.full(len(points), 0.25, np.float32), np.zeros(len(points), np.uint8), seen)
-
-
-def found(folder, frame="map"):
-    folder.mkdir()
-    given = stand.findings(folder, evidence=hot)
-    return replace(given, frame=frame, trees=[replace(tree, frame=frame) for tree in given.trees])
-
-
-def hand_out(recording, findings, *, gnss=True, **settings):
-    done = process(Task([recording], gnss=gnss), Config(), load=fakes())
-    config = msgspec.structs.replace(Products(), **settings)
-    stage = ProductsStage(done.folder / "work", done.folder, config, "walk", "mapforest", findings)
-    return done.folder, stage.run(lambda _: None)
 
 
 def names(folder):
