@@ -30,7 +30,8 @@ def run(args: argparse.Namespace) -> int:
     from edge.process.process import Task
     from edge.report.report import write_report
 
-    path = write_report(Task(args.recording, args.products), load(args.config), args.output)
+    with console(stderr=True).status("reading the recording, drawing the map: a minute for a walk of a kilometre"):
+        path = write_report(Task(args.recording, args.products), load(args.config), args.output)
     if args.json:
         print(json.dumps({"report": str(path), "size_bytes": path.stat().st_size}))
     else:

@@ -153,7 +153,8 @@ def _outline(bounds: Bounds) -> Array:
 
 
 def _coloured(probability: npt.NDArray[np.float32]) -> bytes:
-    at = [value for value, _ in RAMP]
-    red, green, blue, alpha = (np.interp(probability, at, [colour[k] for _, colour in RAMP]) for k in range(4))
-    picture = np.dstack([blue, green, red, np.where(np.isnan(probability), 0, alpha)])
-    return bytes(cv2.imencode(".png", np.nan_to_num(picture).round().astype(np.uint8))[1])
+    at, colours = [value for value, _ in RAMP], np.array([colour for _, colour in RAMP], np.float64)
+    known = np.nan_to_num(probability)
+    red, green, blue, alpha = (np.interp(known, at, channel).round().astype(np.uint8) for channel in colours.T)
+    alpha[np.isnan(probability)] = 0
+    return bytes(cv2.imencode(".png", np.dstack([blue, green, red, alpha]))[1])
