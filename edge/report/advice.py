@@ -105,8 +105,8 @@ def _trees(made: Made) -> Iterator[Finding]:
             f"The detector {found.model} learned from simulated images.",
             "Never report what it finds. Train a model on real pictures for real forests.",
         )
-    if made.trees:
-        yield Finding(Level.NOTE, "", f"{found.trees} trees, none of them verified.", UNVERIFIED)
+    if made.unverified:
+        yield Finding(Level.NOTE, "", f"{made.unverified} of {found.trees} trees are unverified.", UNVERIFIED)
     weak = [int(tree["tree_id"]) for tree in made.trees if tree["n_hits"] <= FEW_HITS]
     if weak:
         named = ", ".join(map(str, weak[:20])) + (" and others" if len(weak) > 20 else "")

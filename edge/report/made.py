@@ -45,6 +45,11 @@ class Made:
     trees: list[dict[str, Any]] = field(default_factory=list)
     searched: list[Array] = field(default_factory=list)
 
+    @property
+    def unverified(self) -> int:
+        """Trees that nobody has confirmed or rejected in the GeoPackage."""
+        return sum(tree["verification_status"] == "unverified" for tree in self.trees)
+
     def plan(self, positions_m: Array) -> Array:
         """(n, 2 or 3) in the frame of the poses -> (n, 2)."""
         site = _site(self.facts)

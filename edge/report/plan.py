@@ -24,7 +24,6 @@ _CHIP_PX = 320
 _CHIPS = 150
 """Pictures of so many trees, the most probable: 20 kB each."""
 _RELIEF = "relief"
-_SAID = {"", DEMONSTRATION}
 _HEAD = ("", "tree", "place", "known to", "beside the way", "size", "seen", "remarks")
 
 
@@ -111,8 +110,6 @@ def _row(made: Made, tree: dict[str, Any], *, pictured: bool) -> tuple[str, ...]
     if picture is not None and picture.exists():
         photo = sheet.photo(smaller(picture, _CHIP_PX), f"tree {tree['tree_id']}")
     name = tree["scientific_name"] or tree["common_name"]
-    # Of a model that learned from simulated images it has been said above.
-    said = "; ".join(part for part in (tree["verification_status"], *tree["comments"].split("; ")) if part not in _SAID)
     return (
         photo,
         sheet.text(f"{tree['tree_id']}: {name}, {tree['probability']:.0%}"),
@@ -121,8 +118,14 @@ def _row(made: Made, tree: dict[str, Any], *, pictured: bool) -> tuple[str, ...]
         f"{tree['from_track_m']:.1f} m, {tree['along_track_m']:.0f} m after its start",
         _size(tree),
         f"recognised in {tree['n_hits']} of {tree['n_views']} images",
-        sheet.text(said),
+        sheet.text(_remarks(tree)),
     )
+
+
+def _remarks(tree: dict[str, Any]) -> str:
+    """Without what has been said above; a person may have emptied the fields."""
+    said = (tree["verification_status"] or "", *(tree["comments"] or "").split("; "))
+    return "; ".join(part for part in said if part not in ("", DEMONSTRATION))
 
 
 def _place(tree: dict[str, Any]) -> str:

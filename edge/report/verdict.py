@@ -59,6 +59,6 @@ def _facts(judged: Report, record: SessionRecord | None, made: Made | None) -> d
         shown["walked"] = f"{made.facts.travelled_m:,.0f} m"
         shown["position known to"] = f"{made.facts.sigma_end_m:.2f} m at the end"
         if made.facts.findings is not None:
-            shown["trees found"] = f"{made.facts.findings.trees}, unverified"
+            shown["trees found"] = f"{made.facts.findings.trees}, {made.unverified} unverified"
             shown["searched"] = f"{made.facts.findings.searched_m2:,.0f} m²"
     return shown

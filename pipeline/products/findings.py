@@ -55,3 +55,8 @@ class Findings:
     coverage: CoverageGrid = field(default_factory=CoverageGrid)
     chips: Mapping[int, Path] = field(default_factory=dict)
     evidence: Evidence | None = None
+
+    @property
+    def positions_m(self) -> npt.NDArray[np.float64]:
+        """(n, 3) of the trees."""
+        return np.array([tree.position_m for tree in self.trees], np.float64).reshape(-1, 3)

@@ -25,7 +25,6 @@ class Handout:
     @classmethod
     def of(cls, findings: Findings, survey: Survey, gap_m: float) -> Handout:
         """gap_m: trees whose crowns come closer than this share a patch."""
-        positions = np.array([tree.position_m for tree in findings.trees]).reshape(-1, 3)
         crowns = np.array([tree.crown_m for tree in findings.trees], np.float64)
-        rows = occurrences(findings, survey)
-        return cls(findings, survey, rows, patches(positions, crowns, gap_m), searched_area(findings.coverage))
+        grown = patches(findings.positions_m, crowns, gap_m)
+        return cls(findings, survey, occurrences(findings, survey), grown, searched_area(findings.coverage))

@@ -63,12 +63,11 @@ class Survey:
 def occurrences(findings: Findings, survey: Survey) -> Columns:
     """Columns (n,), in order of the trees. Text is empty and numbers are NaN where nothing is known."""
     trees = findings.trees
-    positions = np.array([tree.position_m for tree in trees]).reshape(-1, 3)
     return {
         **_identity(trees, findings, survey),
         **_measures(trees),
         **_time(trees, survey),
-        **_whereabouts(trees, positions, survey),
+        **_whereabouts(findings, survey),
         **_provenance(trees, findings, survey),
     }
 
@@ -136,8 +135,9 @@ def _time(trees: Sequence[Tree], survey: Survey) -> Columns:
     }
 
 
-def _whereabouts(trees: Sequence[Tree], positions: Array, survey: Survey) -> Columns:
-    sigma = np.array([tree.sigma_m for tree in trees], np.float64)
+def _whereabouts(findings: Findings, survey: Survey) -> Columns:
+    positions = findings.positions_m
+    sigma = np.array([tree.sigma_m for tree in findings.trees], np.float64)
     away, along = _from_the_way(positions, survey.positions_m)
     known = {
         "sigma_m": sigma.round(3),

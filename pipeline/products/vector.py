@@ -15,7 +15,6 @@ import shapely
 
 from pipeline.products.areas import on_the_grid
 from pipeline.products.earth import Site
-from pipeline.products.findings import Findings
 from pipeline.products.handout import Handout
 from pipeline.products.occurrences import UNVERIFIED, Columns, Survey, text
 from pipeline.products.simplify import simplified
@@ -67,16 +66,14 @@ def add_findings(path: Path, handout: Handout) -> None:
 
     Detections are in EPSG:4326, as databases want them, everything else as the way is.
     """
-    findings, survey, site = handout.findings, handout.survey, handout.survey.site
-    positions = np.array([tree.position_m for tree in findings.trees]).reshape(-1, 3)
+    site, positions = handout.survey.site, handout.findings.positions_m
     places = positions if site is None else site.geodetic(positions)
     detections = _Layer("detections", "Point", _LOCAL if site is None else "EPSG:4326", UNVERIFIED)
     _write(path, detections, shapely.points(places[:, :2]), handout.rows)
     shapes = [_placed(patch.outline, site) for patch in handout.patches]
     _write(path, _Layer("patches", "Polygon", _metric(site), UNVERIFIED), shapes, _patch_columns(handout))
-    searched = _placed(handout.searched, site)
-    columns = _searched_columns(findings, survey, searched.area)
-    _write(path, _Layer("searched_area", "MultiPolygon", _metric(site)), [searched], columns)
+    searched = [_placed(handout.searched, site)]
+    _write(path, _Layer("searched_area", "MultiPolygon", _metric(site)), searched, _searched_columns(handout))
 
 
 def add_styles(path: Path) -> None:
@@ -114,10 +111,11 @@ def _patch_columns(handout: Handout) -> Columns:
     }
 
 
-def _searched_columns(findings: Findings, survey: Survey, area_m2: float) -> Columns:
+def _searched_columns(handout: Handout) -> Columns:
+    findings, survey = handout.findings, handout.survey
     return {
         "uuid": text([str(uuid.uuid5(_NAMESPACE, f"{survey.session}/searched"))]),
-        "area_m2": np.array([area_m2]).round(1),
+        "area_m2": np.array([handout.searched.area]).round(1),
         "n_detections": np.array([len(findings.trees)], np.int32),
         "n_images": np.array([findings.images], np.int32),
         "survey_method": text([f"camera on the move, detector {findings.model.name}; unhidden map points within view"]),

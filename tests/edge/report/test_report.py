@@ -139,7 +139,7 @@ def test_advice_is_given_where_something_is_wrong_and_not_elsewhere(recording, t
     folder, _ = hand_out(recording, found(tmp_path / "given"))
     made = read_made(folder)
     said = " ".join(one.text for one in advise(made))
-    assert "3 trees, none of them verified" in said
+    assert "3 of 3 trees are unverified" in said
     assert "Only 0% of the fixes had RTK" in said
     assert "known to" not in said
     worse = replace(

@@ -64,7 +64,7 @@ def test_detections_are_in_wgs_84_and_areas_in_the_grid(tmp_path):
         grown["percent_cover"], 100 * grown["infested_area_m2"] / grown["gross_area_m2"], atol=0.1
     )
     _, (searched,), told = read(path, "searched_area")
-    assert told["area_m2"][0] == pytest.approx(searched.area, abs=0.1)
+    assert told["area_m2"][0] * SITE.scale**2 == pytest.approx(searched.area, rel=1e-4)  # on the ground, not the grid
     assert (told["n_detections"][0], told["n_images"][0]) == (3, 1200)
     trees = SITE.utm(np.array([tree.position_m for tree in findings().trees]))[:, :2]
     assert shapely.contains(searched, shapely.points(trees)).all()
