@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 from edge.errors import EdgeError
@@ -10,13 +12,14 @@ from edge.process.product_facts import FindingFacts, Shelf
 from edge.process.way_files import Walk, pose_columns, way_facts
 from pipeline.products.handout import Handout
 from pipeline.products.kml import write_findings_kml, write_kmz
-from pipeline.products.occurrences import DEMONSTRATION, UNVERIFIED
+from pipeline.products.occurrences import DEMONSTRATION, UNVERIFIED, utc
 from pipeline.products.raster import preview, write_geotiff
 from pipeline.products.styles import detections_style, evidence_style
 from pipeline.products.tables import write_csv, write_darwin_core, write_geojson, write_imapinvasives
 from pipeline.products.vector import add_findings, add_styles, write_way
 
 PICTURES = "DCIM"
+PACKAGES = ("findings.gpkg", "findings_local.gpkg")
 LAYERS = "detections, patches, searched area, track and poses"
 
 
@@ -32,6 +35,31 @@ def write_finding_files(shelf: Shelf, handout: Handout, walk: Walk) -> None:
         _local(shelf, handout, walk)
     else:
         _on_the_earth(shelf, handout, walk)
+
+
+def keep_verified(folder: Path) -> list[str]:
+    """Take a package in which people confirmed or rejected trees out of the way of a new one. Returns what was done.
+
+    Of findings that did not change, `uuid` joins the old and the new.
+    """
+    told = []
+    for path in (folder / name for name in PACKAGES):
+        if path.exists() and (count := _verified(path)):
+            kept = path.with_name(f"{path.stem}_verified_{utc(path.stat().st_mtime_ns).replace(':', '')}.gpkg")
+            path.replace(kept)
+            told.append(f"{count} trees in {path.name} had been verified: it was kept as {kept.name}")
+    return told
+
+
+def _verified(path: Path) -> int:
+    try:
+        with closing(sqlite3.connect(path)) as package:
+            (count,) = package.execute(
+                "select count(*) from detections where verification_status is not 'unverified'"
+            ).fetchone()
+            return int(count)
+    except sqlite3.DatabaseError:  # not a package any more: nothing to keep
+        return 0
 
 
 def _local(shelf: Shelf, handout: Handout, walk: Walk) -> None:

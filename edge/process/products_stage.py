@@ -15,7 +15,7 @@ import numpy.typing as npt
 from drivers.messages import GnssFix
 from edge.config import Products
 from edge.process import fusion_stage, odometry_stage
-from edge.process.finding_files import PICTURES, write_finding_files
+from edge.process.finding_files import PICTURES, keep_verified, write_finding_files
 from edge.process.fusion_stage import FusionFacts, read_placement
 from edge.process.odometry_stage import OdometryFacts, read_fixes
 from edge.process.product_facts import PRODUCTS_JSON, REPORT, Georeference, ProductFacts, Shelf, whole
@@ -77,9 +77,11 @@ class ProductsStage:
         placement = read_placement(self.work / "fusion" / fusion_stage.PLACEMENT)
         done = msgspec.json.decode((odometry / odometry_stage.FACTS).read_bytes(), type=OdometryFacts)
         fused = msgspec.json.decode((self.work / "fusion" / fusion_stage.FACTS).read_bytes(), type=FusionFacts)
+        kept = keep_verified(self.output)
         self._clear()
         walk = self._walk(track, placement, done, read_fixes(odometry / odometry_stage.FIXES))
         shelf = Shelf(self.output, self._facts(walk, done, fused))
+        shelf.facts.notes = (*kept, *shelf.facts.notes)
         write_way_files(shelf, walk)
         if self.findings is not None:
             write_finding_files(shelf, Handout.of(self.findings, walk.survey, self.config.patch_gap_m), walk)

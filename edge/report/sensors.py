@@ -38,9 +38,7 @@ def sensor_parts(targets: Sequence[Path], judged: Report, config: Config) -> Ite
     """From the times of the messages, and from what the recorder wrote about itself."""
     yield sheet.section("Sensors")
     store = MessageStore(targets)
-    yield sheet.table(
-        ("topic", "messages", "a second", "expected", "longest gap", ""), list(map(_row, _judged(judged)))
-    )
+    yield sheet.table(_HEAD, list(map(_row, _judged(judged))))
     for topic in _judged(judged):
         if topic.count > 1 and (topic.expected_hz or 0.0) >= _SLOW_HZ:
             yield sheet.figure(f"{topic.name}, messages a second", _rate(store.times_ns(topic.name), topic, judged))

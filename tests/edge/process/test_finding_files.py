@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 
 import laspy
@@ -78,6 +80,26 @@ def test_without_a_detector_there_are_none_of_them_and_old_ones_go(recording, tm
     assert not ON_EARTH & set(facts.files)
     assert facts.findings is None
     assert list(laspy.read(folder / "map.laz").point_format.extra_dimension_names) == ["sweep", "sigma_m"]
+
+
+def test_what_people_verified_is_never_lost(recording, tmp_path):
+    given = found(tmp_path / "given")
+    folder, _ = hand_out(recording, given)
+    with closing(sqlite3.connect(folder / "findings.gpkg")) as package:
+        # GDAL's triggers want functions that SQLite alone does not have.
+        for (name,) in package.execute("select name from sqlite_master where type = 'trigger'").fetchall():
+            package.execute(f'drop trigger "{name}"')
+        package.execute("update detections set verification_status = 'confirmed' where tree_id = 7")
+        package.commit()
+    _, facts = hand_out(recording, given)
+    (kept,) = folder.glob("findings_verified_*.gpkg")
+    assert f"1 trees in findings.gpkg had been verified: it was kept as {kept.name}" in facts.notes
+    _, _, _, (status,) = pyogrio.raw.read(kept, layer="detections", columns=["verification_status"])
+    assert sorted(status) == ["confirmed", "unverified", "unverified"]
+    _, again = hand_out(recording, given)
+    assert not any("verified" in note for note in again.notes)
+    (folder / "findings.gpkg").write_bytes(b"torn")
+    hand_out(recording, given)
 
 
 def test_nothing_found_is_handed_out_too(recording, tmp_path):
