@@ -97,6 +97,13 @@ class Products(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tile_m: Positive = 16.0
     memory_mib: Count = 96
     """The growing map in memory; the rest waits on the disk."""
+    geoid: Literal["receiver", "none"] | float = "receiver"
+    """Metres of the geoid above the ellipsoid at the site, for orthometric heights; "receiver": as it says itself."""
+    patch_gap_m: NotNegative = 5.0
+    """Trees whose crowns come closer to each other than this are one patch."""
+    observer: str = ""
+    """Who answers for what was found, as databases know them; empty: the operator of the recording."""
+    organization: str = ""
 
 
 class Detection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

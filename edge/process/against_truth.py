@@ -8,11 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from edge.config import Config
 from edge.errors import FormatError
-from edge.process.products_stage import ProductFacts
+from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
 from edge.replay.poses import LivePoses, read_live_poses
 from pipeline.evaluation.pair import ALIGNMENTS, Pair
 from pipeline.evaluation.trajectory import Alignment, Trajectory, read_tum, together
@@ -41,7 +39,7 @@ def find_pairs(target: Path, truth: Path, config: Config | None = None) -> list[
 
 def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
     folder = _products_folder(target)
-    facts = msgspec.json.decode((folder / "products.json").read_bytes(), type=ProductFacts)
+    facts = read_facts(folder)
     true = _plain_truth(truth) if truth.is_file() else _simulated(truth, facts)
     here = Datum(*facts.datum) if facts.datum is not None else None
     goal = here if truth.is_file() else _world(truth)
@@ -74,8 +72,8 @@ def _offline(products: Path) -> Trajectory | None:
     if not (products / "trajectory.tum").exists():
         return None
     found = read_tum(products / "trajectory.tum")
-    stamps, covariance = read_covariance(products / "covariance.csv")
-    return replace(found, covariance=covariance) if len(stamps) == len(found.stamps_ns) else found
+    poses = read_covariance(products / "covariance.csv")
+    return replace(found, covariance=poses.covariance[:, :3, :3]) if len(poses) == len(found.stamps_ns) else found
 
 
 def _in_map(earth: Trajectory, datum: Datum) -> Trajectory:
@@ -105,7 +103,7 @@ def _world(truth: Path) -> Datum:
 
 def _products_folder(target: Path) -> Path:
     for folder in (target, target / "products"):
-        if (folder / "products.json").exists():
+        if (folder / PRODUCTS_JSON).exists():
             return folder
     raise FormatError(f"{target}: not processed yet; run `mapforest process {target}` first")
 

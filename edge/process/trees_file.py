@@ -10,7 +10,8 @@ import numpy as np
 
 from pipeline.trees import Tree, View
 
-TREES, EVIDENCE, FACTS = "trees.msgpack", "evidence.npz", "grounding.json"
+TREES, EVIDENCE, SEARCHED, FACTS = "trees.msgpack", "evidence.npz", "searched.npz", "grounding.json"
+PICTURES = "pictures"
 
 
 class GroundingFacts(msgspec.Struct):
@@ -18,6 +19,8 @@ class GroundingFacts(msgspec.Struct):
     unplaced: of these, on nothing of the map. notes: what has to be said."""
 
     target: str = ""
+    frame: str = "odom"
+    """Of trees and of what was searched: `map` or `odom`."""
     views: int = 0
     blind: int = 0
     lost: int = 0

@@ -67,20 +67,12 @@ class Evidence:
             np.where(known, found["hits"], 0).astype(np.uint16),
         )
 
-    def columns(self, cell_m: float) -> tuple[npt.NDArray[np.int64], Heat]:
-        """Cells (m, 2) in plan, cell_m a side, and of each the strongest evidence and the most looks above it."""
+    def voxels(self) -> tuple[Array, npt.NDArray[np.float32], npt.NDArray[np.int32]]:
+        """Middles (n, 3) of those that are known, log-odds (n,), and the last view that spoke of each (n,), from 1."""
         used = self._keys != kernels.EMPTY
         keys, voxels = self._keys[used], self._voxels[used]
-        axes = [((keys >> shift) & kernels.FIELD) - kernels.HALF for shift in (42, 21)]
-        cells = np.floor((np.column_stack(axes) + 0.5) * self.voxel_m / cell_m).astype(np.int64)
-        unique, column = np.unique(cells, axis=0, return_inverse=True)
-        column = column.ravel()
-        log_odds = np.full(len(unique), -np.inf, np.float32)
-        seen, hits = np.zeros(len(unique), np.uint16), np.zeros(len(unique), np.uint16)
-        np.maximum.at(log_odds, column, voxels["log_odds"])
-        np.maximum.at(seen, column, voxels["seen"])
-        np.maximum.at(hits, column, voxels["hits"])
-        return unique, Heat(log_odds, seen, hits)
+        axes = [((keys >> shift) & kernels.FIELD) - kernels.HALF for shift in (42, 21, 0)]
+        return (np.column_stack(axes) + 0.5) * self.voxel_m, voxels["log_odds"], voxels["last"]
 
     def save(self, path: Path) -> None:
         """As a numpy archive."""

@@ -26,6 +26,7 @@ from pipeline.grounding.views import CameraView
 from pipeline.trees import Tree
 
 Array = npt.NDArray[np.float64]
+NOTHING = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +52,8 @@ class Grounding:
         self._anchored: Surroundings | None = None
         self._last_m: Array | None = None
 
-    def look(self, view: CameraView, detections: FrameDetections) -> None:
-        """One image. Views come in order of time."""
+    def look(self, view: CameraView, detections: FrameDetections) -> Array:
+        """One image. Views come in order of time. Returns the points (n, 3) that it has evidence of."""
         around = self._neighbourhood.at(view.position_m)
         if around is not None and around is not self._anchored:
             self._hypotheses.anchor(around.stems, float(view.position_m[2]))
@@ -61,15 +62,14 @@ class Grounding:
         counts = self.counts
         if around is None:
             self.counts = Counts(counts.views + 1, counts.blind + 1, counts.boxes + len(boxes), counts.unplaced)
-            return
+            return NOTHING
         depth = DepthImage(view, around, self.config)
         found = [sight(box, sure, depth, self.config) for box, sure in boxes]
         sightings = [one for one in found if one is not None and one.range_m < self.config.farthest_m]
         self._hypotheses.look(depth, sightings)
-        if self.evidence is not None:
-            self._mark(around, depth, boxes, sightings)
         missing = len(boxes) - len(sightings)
         self.counts = Counts(counts.views + 1, counts.blind, counts.boxes + len(boxes), counts.unplaced + missing)
+        return NOTHING if self.evidence is None else self._mark(self.evidence, around, depth, boxes, sightings)
 
     def probable(self) -> list[Hypothesis]:
         """Those that are more probable than not, without what takes longer to say of them."""
@@ -84,8 +84,13 @@ class Grounding:
         ]
 
     def _mark(
-        self, around: Surroundings, depth: DepthImage, boxes: list[tuple[Array, float]], sightings: list[Sighting]
-    ) -> None:
+        self,
+        evidence: Evidence,
+        around: Surroundings,
+        depth: DepthImage,
+        boxes: list[tuple[Array, float]],
+        sightings: list[Sighting],
+    ) -> Array:
         """Evidence for each unhidden point within range: its cell's word."""
         config, view = self.config, depth.view
         fresh = self._freshness(view.position_m)
@@ -102,8 +107,10 @@ class Grounding:
         rows, cols = words.shape
         row = np.minimum(((pixels[:, 1] + 0.5) / depth.cell_px).astype(int), rows - 1)
         col = np.minimum(((pixels[:, 0] + 0.5) / depth.cell_px).astype(int), cols - 1)
-        assert self.evidence is not None
-        self.evidence.add(around.points_m[front], words[row, col])
+        said = words[row, col]
+        points = around.points_m[front]
+        evidence.add(points, said)
+        return np.asarray(points[np.isfinite(said)])
 
     def _freshness(self, place_m: Array) -> float:
         evidence = self.config.evidence

@@ -49,14 +49,14 @@ def test_what_was_saved_goes_on(tmp_path):
     assert again.at(points).seen.min() == 2
 
 
-def test_a_column_has_the_strongest_word_above_a_cell():
+def test_voxels_are_told_with_the_last_view_that_spoke_of_them():
     evidence = Evidence(0.3, 8.0)
-    evidence.add(
-        np.array([[0.1, 0.1, 0.1], [0.1, 0.1, 5.0], [-3.0, 0.1, 1.0]]), np.array([-1.0, 2.0, -0.5], np.float32)
-    )
-    cells, heat = evidence.columns(1.0)
-    told = {tuple(cell): odds for cell, odds in zip(cells.tolist(), heat.log_odds.tolist(), strict=True)}
-    assert told == {(0, 0): 2.0, (-3, 0): -0.5}
+    evidence.add(np.array([[0.1, 0.1, 0.1], [-3.1, 0.1, 5.0]]), np.array([-1.0, 2.0], np.float32))
+    evidence.add(np.array([[-3.1, 0.1, 5.0]]), np.array([1.0], np.float32))
+    middles, log_odds, last = evidence.voxels()
+    told = {tuple(place): said for *place, said in np.column_stack([middles.round(2), log_odds]).tolist()}
+    assert told == {(0.15, 0.15, 0.15): -1.0, (-3.15, 0.15, 4.95): 3.0}
+    assert sorted(last.tolist()) == [1, 2]
 
 
 def test_a_tree_seen_ten_times_and_detected_once_is_no_finding():
