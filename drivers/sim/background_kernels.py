@@ -11,7 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
-from drivers.sim.render_kernels import FAR_M, HAZE, HAZE_M
+from drivers.sim.render_kernels import FAR_M, HAZE, HAZE_M, NOTHING_M
 
 _jit = nb.njit(cache=True, nogil=True, fastmath=True, boundscheck=False)
 
@@ -135,6 +135,6 @@ def _far_block(rgb, depth, corner, far, j, i):
             u = i * BLOCK + column
             for c in range(3):
                 rgb[v, u, c] = far[y, x, c]
-            depth[v, u] = 1e6
+            depth[v, u] = NOTHING_M
             azimuth += azimuth_step
             elevation += elevation_step

@@ -18,6 +18,8 @@ FAR_M = 38.0
 HAZE = (176.0, 188.0, 184.0)
 HAZE_M = 75.0
 NEAR_M = 0.25
+NOTHING_M = 1e6
+"""Depth where nothing is near."""
 
 
 @_jit

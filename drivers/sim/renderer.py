@@ -53,6 +53,10 @@ class Renderer:
         self._faces, self._face_colours = _box_faces(scene.boxes)
         self._rgb = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
         self._depth = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)
+        self._alone_rgb = np.zeros_like(self._rgb)
+        self._alone = np.zeros_like(self._depth)
+        self._turn: Doubles = np.eye(3)
+        self._eye: Doubles = np.zeros(3)
         self._near_at: Doubles = np.full(2, np.inf)
         self._stems: Chosen = np.empty(0, dtype=np.int64)
         self._branches: Chosen = self._stems
@@ -60,20 +64,37 @@ class Renderer:
 
     @property
     def depth_m(self) -> npt.NDArray[np.float32]:
-        """Depth (h, w) of the last picture along the optical axis; 1e6 where nothing is near."""
+        """Depth (h, w) of the last picture along the optical axis; `kernels.NOTHING_M` where nothing is near."""
         return self._depth
+
+    @property
+    def eye_m(self) -> Doubles:
+        """(3,) where the camera was at the last picture, in the world."""
+        return self._eye
 
     def render(self, t_ns: int) -> Picture:
         """RGB (h, w, 3) at a walk time. The array is used again for the next picture."""
         position, rotation = self._trajectory.poses([t_ns])
-        eye = position[0] + rotation[0] @ np.asarray(self._camera.position_m)
-        turn = np.ascontiguousarray((rotation[0] @ self._camera.rotation).T)
-        self._look_around(eye)
-        view = (self._rgb, self._depth, self._camera.lens, turn, eye)
+        self._eye = position[0] + rotation[0] @ np.asarray(self._camera.position_m)
+        self._turn = np.ascontiguousarray((rotation[0] @ self._camera.rotation).T)
+        self._look_around(self._eye)
+        view = (self._rgb, self._depth, self._camera.lens, self._turn, self._eye)
         self._paint_ground(view)
         kernels.draw_faces(*view, self._faces, self._face_colours)
-        self._draw_plants(view)
+        self._draw_plants(view, self._stems, self._branches, self._foliage)
         return self._rgb
+
+    def depth_alone_m(self, tree: int) -> npt.NDArray[np.float32]:
+        """Depth (h, w) of one tree as the last picture would have it if nothing else stood there.
+
+        The picture shows the tree where this is no more than `depth_m`. The array is used again for the next tree.
+        """
+        self._alone.fill(kernels.NOTHING_M)
+        view = (self._alone_rgb, self._alone, self._camera.lens, self._turn, self._eye)
+        wood = self._branches[self._scene.branches.tree[self._branches] == tree]
+        leaves = self._foliage[self._scene.foliage.tree[self._foliage] == tree]
+        self._draw_plants(view, self._stems[self._stems == tree], wood, leaves)
+        return self._alone
 
     def _paint_ground(self, view: tuple[npt.NDArray[np.generic], ...]) -> None:
         terrain, textures = self._scene.terrain, self._textures
@@ -90,11 +111,13 @@ class Renderer:
             0.5 * (SOIL + LITTER),
         )
 
-    def _draw_plants(self, view: tuple[npt.NDArray[np.generic], ...]) -> None:
+    def _draw_plants(
+        self, view: tuple[npt.NDArray[np.generic], ...], some_stems: Chosen, some_wood: Chosen, some_leaves: Chosen
+    ) -> None:
         stems, wood, leaves, bark = self._scene.stems, self._scene.branches, self._scene.foliage, self._textures.bark
         kernels.draw_stems(
             *view,
-            self._stems,
+            some_stems,
             stems.base_m,
             stems.top_m,
             stems.radius_base_m,
@@ -104,9 +127,9 @@ class Renderer:
             bark,
         )
         wood_arrays = (wood.start_m, wood.end_m, wood.radius_m, wood.species)
-        kernels.draw_branches(*view, self._branches, *wood_arrays, bark, BRANCH_REACH_M)
+        kernels.draw_branches(*view, some_wood, *wood_arrays, bark, BRANCH_REACH_M)
         sprites = (self._sprites.rgba, self._sprites.start, self._sizes)
-        kernels.draw_foliage(*view, self._foliage, leaves.centre_m, self._half_m, leaves.species, *sprites)
+        kernels.draw_foliage(*view, some_leaves, leaves.centre_m, self._half_m, leaves.species, *sprites)
 
     def _look_around(self, eye: Doubles) -> None:
         """Choose what is near, nearest first, so that most of what is hidden is never drawn."""

@@ -54,7 +54,7 @@ def test_ground_is_as_deep_as_a_ray_cast_by_hand(scene):
     camera = Camera()
     eye = np.array([0.0, 0.0, float(scene.terrain.height_at([0.0, 0.0])[0]) + 1.5])
     bare = Renderer(scene, Standing(eye - np.asarray(camera.position_m)), camera, seed=1)
-    bare._draw_plants = lambda view: None
+    bare._draw_plants = lambda *_: None
     bare.render(0)
     for row, column in [(470, 100), (440, 420), (420, 700)]:
         a, b = (column - 423.5) / 432.0, (row - 239.5) / 432.0
