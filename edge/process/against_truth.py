@@ -38,11 +38,11 @@ def find_pairs(target: Path, truth: Path, config: Config | None = None) -> list[
 
 
 def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
-    folder = _products_folder(target)
+    folder = products_folder(target)
     facts = read_facts(folder)
-    true = _plain_truth(truth) if truth.is_file() else _simulated(truth, facts)
+    true = _plain_truth(truth) if truth.is_file() else simulated_way(truth, facts)
     here = Datum(*facts.datum) if facts.datum is not None else None
-    goal = here if truth.is_file() else _world(truth)
+    goal = here if truth.is_file() else world_datum(truth)
     offline = _offline(folder)
     if offline is not None and here is not None and goal is not None:
         offline = _in_map(offline.moved(here.turn, here.origin_m), goal)
@@ -87,21 +87,27 @@ def _plain_truth(path: Path) -> Trajectory:
     return read_tum(path)
 
 
-def _simulated(folder: Path, facts: ProductFacts) -> Trajectory:
+def simulated_way(folder: Path, facts: ProductFacts) -> Trajectory:
     """The emulated payload's poses in session time."""
+    return read_tum(folder / "poses.tum").shifted(walk_begins_ns(folder, facts))
+
+
+def walk_begins_ns(folder: Path, facts: ProductFacts) -> int:
+    """Session time of the emulated walk's t = 0."""
     epoch_ns = int(_json(folder / "epoch.json", "monotonic_ns"))
     if facts.host_offset_ns is None:
         raise FormatError(f"{facts.session} was not recorded by mapforest: its time cannot be put to the simulation's")
-    return read_tum(folder / "poses.tum").shifted(epoch_ns + facts.host_offset_ns)
+    return epoch_ns + facts.host_offset_ns
 
 
-def _world(truth: Path) -> Datum:
+def world_datum(truth: Path) -> Datum:
     """Where the simulated world lies."""
     world = _json(truth / "world.json", "datum")
     return Datum(world["latitude_deg"], world["longitude_deg"], world["height_m"])
 
 
-def _products_folder(target: Path) -> Path:
+def products_folder(target: Path) -> Path:
+    """Of a session, or itself. FormatError where there are none."""
     for folder in (target, target / "products"):
         if (folder / PRODUCTS_JSON).exists():
             return folder

@@ -58,17 +58,10 @@ def tree_errors(
     wanted: npt.NDArray[np.bool_],
     *,
     probable: float = 0.5,
-    shift_m: Array | None = None,
 ) -> TreeErrors:
-    """places_m: (n, 2) of all targets; wanted: (n,) those that should be found. All in one frame.
-
-    shift_m: (k, 2) what is to be taken off the places of the k probable trees: the error of the trajectory there, to
-    judge the grounding alone.
-    """
+    """places_m: (n, 2) of all targets; wanted: (n,) those that should be found. All in one frame."""
     mapped = [tree for tree in trees if tree.probability >= probable]
     found_m = np.array([tree.position_m[:2] for tree in mapped]).reshape(-1, 2)
-    if shift_m is not None:
-        found_m = found_m - shift_m
     rows, cols = _paired(found_m, places_m)
     away = found_m[rows] - places_m[cols]
     spread = np.array([mapped[k].covariance[:2, :2] for k in rows]).reshape(-1, 2, 2)

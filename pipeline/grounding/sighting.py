@@ -72,7 +72,7 @@ def sight(box_px: Array, confidence: float, depth: DepthImage, config: Grounding
 
 def _cells_within(box_px: Array, depth: DepthImage) -> tuple[slice, slice]:
     shape = depth.range_m.shape
-    x0, y0, x1, y1 = (box_px + 0.5) / depth.cell_px
+    x0, y0, x1, y1 = box_px / depth.cell_px
     rows = slice(int(np.clip(y0, 0, shape[0] - 1)), int(np.clip(np.ceil(y1), 1, shape[0])))
     cols = slice(int(np.clip(x0, 0, shape[1] - 1)), int(np.clip(np.ceil(x1), 1, shape[1])))
     return rows, cols
@@ -80,8 +80,8 @@ def _cells_within(box_px: Array, depth: DepthImage) -> tuple[slice, slice]:
 
 def _weights(box_px: Array, depth: DepthImage, rows: slice, cols: slice) -> Array:
     x0, y0, x1, y1 = box_px
-    u = (np.arange(cols.start, cols.stop) + 0.5) * depth.cell_px - 0.5
-    v = (np.arange(rows.start, rows.stop) + 0.5) * depth.cell_px - 0.5
+    u = (np.arange(cols.start, cols.stop) + 0.5) * depth.cell_px
+    v = (np.arange(rows.start, rows.stop) + 0.5) * depth.cell_px
     across = np.exp(-0.5 * ((u - 0.5 * (x0 + x1)) / max(ACROSS * (x1 - x0), depth.cell_px)) ** 2)
     along = np.exp(-0.5 * ((v - 0.5 * (y0 + y1)) / max(ALONG * (y1 - y0), depth.cell_px)) ** 2)
     return np.asarray(along[:, None] * across)
@@ -115,7 +115,7 @@ def _bearing(box_px: Array, range_m: float, depth: DepthImage, config: Grounding
     """Horizontal unit vector (2,) to the middle of a box, and the sigma (m) across it at a range."""
     view = depth.view
     x0, _, x1, _ = box_px
-    middle = 0.5 * (box_px[:2] + box_px[2:])
+    middle = 0.5 * (box_px[:2] + box_px[2:]) - 0.5  # a box counts from edges, a lens from the middles of pixels
     ray = view.rotation @ view.model.rays(middle[None])[0]
     ahead = ray[:2] / np.hypot(ray[0], ray[1])
     share = config.box_sigma

@@ -41,12 +41,6 @@ def test_two_on_one_are_one_and_one_too_many():
     assert (errors.right, errors.made_up) == (1, (2,))
 
 
-def test_the_error_of_the_trajectory_can_be_taken_off():
-    moved = [tree(1, 0.9), tree(2, 5.9)]
-    assert tree_errors(moved, PLACES, WANTED).error_median_m == pytest.approx(0.9)
-    assert tree_errors(moved, PLACES, WANTED, shift_m=np.tile([0.9, 0.0], (2, 1))).error_worst_m < 1e-9
-
-
 def test_nothing_is_no_error():
     errors = tree_errors([], PLACES, WANTED)
     assert (errors.found, errors.recall) == (0, 0.0)
