@@ -45,7 +45,7 @@ def session(world, tmp_path):
     """Its datum is not the world's."""
     folder = tmp_path / "products"
     (folder / "work" / "grounding").mkdir(parents=True)
-    t_ns = np.arange(9 * 10**9, 12 * 10**9, 10**8)
+    t_ns = np.arange(18 * 10**9, 21 * 10**9, 10**8)
     positions, rotations = world.trajectory.poses(t_ns)
     write_tum(folder / "trajectory.tum", t_ns + EPOCH_NS + OFFSET_NS, in_map(world, positions + OFF_M), rotations)
     facts = ProductFacts("walk", "map", "", datum=HERE, host_offset_ns=OFFSET_NS, findings=FOUND)
@@ -63,7 +63,7 @@ def in_map(world, places_m):
 
 
 def mapped(session, places_m):
-    middle = EPOCH_NS + OFFSET_NS + 10 * 10**9
+    middle = EPOCH_NS + OFFSET_NS + 19 * 10**9
     trees = [replace(tree(k, 0.0), position_m=p, first_ns=middle, last_ns=middle) for k, p in enumerate(places_m)]
     write_trees(session / "work" / "grounding" / TREES, trees)
 
