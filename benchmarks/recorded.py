@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 
 from drivers.messages import GnssFix, ImuSample, LidarScan, VideoFrame
 from edge.config import Topics
-from edge.recording.summary import SUMMARY_RECORD
+from edge.recording.summary import SESSION_RECORD
 from edge.ros.encode import ENCODERS
 from edge.ros.schemas import schema_text
 from edge.ros.topics import channels
@@ -23,7 +23,7 @@ def write_recording(path: Path, messages: Iterable[Message]) -> None:
     with draft.open("wb") as file:
         writer = Writer(file, compression=CompressionType.NONE)
         writer.start("ros2", "mapforest")
-        writer.add_metadata(SUMMARY_RECORD, {"anchor_utc_ns": "0", "anchor_monotonic_ns": "0"})
+        writer.add_metadata(SESSION_RECORD, {"anchor_utc_ns": "0", "anchor_monotonic_ns": "0"})
         used, ids = channels(Topics()), {}
         for kind in (LidarScan, ImuSample, GnssFix, VideoFrame):
             channel = used[kind]
