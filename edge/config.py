@@ -11,6 +11,7 @@ from drivers import registry
 from edge import toml_table
 from edge.errors import ConfigError
 from pipeline.gnss.config import FusionConfig
+from pipeline.grounding.config import GroundingConfig
 from pipeline.odometry.config import OdometryConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -96,6 +97,13 @@ class Products(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tile_m: Positive = 16.0
     memory_mib: Count = 96
     """The growing map in memory; the rest waits on the disk."""
+    geoid: Literal["receiver", "none"] | float = "receiver"
+    """Metres of the geoid above the ellipsoid at the site, for orthometric heights; "receiver": as it says itself."""
+    patch_gap_m: NotNegative = 5.0
+    """Trees whose crowns come closer to each other than this are one patch."""
+    observer: str = ""
+    """Who answers for what was found, as databases know them; empty: the operator of the recording."""
+    organization: str = ""
 
 
 class Detection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -154,6 +162,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     topics: Topics = Topics()
     odometry: OdometryConfig = OdometryConfig()
     fusion: FusionConfig = FusionConfig()
+    grounding: GroundingConfig = GroundingConfig()
     products: Products = Products()
     detection: Detection = Detection()
     bus: Bus = Bus()

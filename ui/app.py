@@ -88,6 +88,7 @@ class RecorderApp(App[str]):
         self._situation = Situation()
         self._status_s = self._notice_s = float("-inf")
         self._known_faults: frozenset[str] = frozenset()
+        self._known_trees = 0
         self._ready_to_draw = False
 
     def compose(self) -> ComposeResult:
@@ -236,7 +237,7 @@ class RecorderApp(App[str]):
 
     def action_toggle_bell(self) -> None:
         self._bell = not self._bell
-        self.say("Bell on a new fault: " + ("on" if self._bell else "off"))
+        self.say("Bell on a new fault or tree: " + ("on" if self._bell else "off"))
         if self._bell:
             self.bell()
 
@@ -256,7 +257,7 @@ class RecorderApp(App[str]):
         yield SystemCommand("Verdict", "On the last recording, in full", self.action_verdict)
         yield SystemCommand("Check again", "Validate the last recording once more", self.action_check_again)
         yield SystemCommand("Colours", "For the shade, or for the sun", self.action_colours)
-        yield SystemCommand("Bell", "Ring on a new fault, or not", self.action_toggle_bell)
+        yield SystemCommand("Bell", "Ring on a new fault or tree, or not", self.action_toggle_bell)
         yield SystemCommand("Help", "Keys, symbols and words", self.action_help)
         yield SystemCommand("Quit", "Leave this screen; a recording goes on", self.action_quit)
 
@@ -279,5 +280,7 @@ class RecorderApp(App[str]):
 
     def _ring_for_news(self) -> None:
         known, self._known_faults = self._known_faults, frozenset(fault.key for fault in faults(self._situation))
-        if self._bell and self._known_faults - known:
+        status = self._situation.status
+        had, self._known_trees = self._known_trees, status.mapped.trees if status and status.mapped else 0
+        if self._bell and (self._known_faults - known or self._known_trees > had):
             self.bell()

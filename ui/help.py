@@ -11,7 +11,7 @@ KEYS = (
     ("N", "mark this moment, with a few words"),
     ("V", "the verdict on the last recording, in full"),
     ("C", "change the colours: shade, sun"),
-    ("B", "bell on a new fault: on, off"),
+    ("B", "bell on a new fault or tree: on, off"),
     ("P", "all actions by name"),
     ("Q", "leave this screen. A recording goes on"),
 )

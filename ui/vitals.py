@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from edge.control.messages import Detecting, Gnss, Host, Location, Status
+from edge.control.messages import Detecting, Gnss, Host, Location, Mapped, Status
 from ui import units
 from ui.faults import left_tone, queue_tone
 from ui.pieces import Pieces, badge, fit
@@ -109,6 +109,18 @@ def detecting_line(detecting: Detecting) -> Pieces:
         style = tone.text if tone in (Tone.WARN, Tone.BAD) else "$quiet-text"
         pieces = (*pieces, (f"  {detecting.note}", style))
     return pieces
+
+
+def mapped_line(mapped: Mapped) -> Pieces:
+    """What is on the map: how many trees, and where to look for the last one."""
+    some = mapped.trees > 0
+    words = f"{mapped.trees} FOUND" if some else "NONE YET"
+    pieces: Pieces = (("TREES   ", "$quiet-text"), *badge(words, Tone.GOOD if some else Tone.QUIET, BADGE))
+    if mapped.range_m is None:
+        return (*pieces, (f"  {mapped.views} images", "$quiet-text"))
+    hour = round(mapped.bearing_deg / 30.0) % 12 or 12
+    last = f"  last {units.metres(mapped.range_m)} away at {hour} o'clock"
+    return (*pieces, (last, "bold"), (f"  ±{units.metres(mapped.sigma_m)}  {mapped.views} images", "$quiet-text"))
 
 
 def gnss_tone(gnss: Gnss) -> Tone:

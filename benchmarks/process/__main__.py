@@ -9,98 +9,41 @@ Memory is the process's own, read from /proc every second: by tenths of the odom
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-
-import msgspec
-from mcap.writer import CompressionType, Writer
 
 from benchmarks.fusion.table import received
 from benchmarks.odometry.simulated import EPOCH_NS, SCAN_NS, Walk, walk
+from benchmarks.recorded import write_recording
+from benchmarks.watched import process
 from drivers.messages import GnssFix, ImuSample, LidarScan
 from drivers.sim.scenarios import scenario
 from drivers.sim.world import build
-from edge.config import Topics
-from edge.ros.encode import ENCODERS
-from edge.ros.schemas import schema_text
-from edge.ros.topics import channels
 
 SECOND_NS = 1_000_000_000
 
 
-@dataclass(frozen=True)
-class Sample:
-    """stages: how many are finished."""
-
-    after_s: float
-    stages: int
-    memory_mb: float
-
-
 def main() -> None:
     options = _options()
-    source = _recording(options)
-    output = options.cache / "long_products"
-    command = [sys.executable, "-m", "edge.cli.main", "process", str(source), "--output", str(output), "--fresh"]
-    begun_s = time.monotonic()
-    process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True)
-    samples = list(_watched(process, output / "work" / "state.json"))
-    text, _ = process.communicate()
-    took_s = time.monotonic() - begun_s
-    facts = msgspec.json.decode(text)
+    run = process(_recording(options), options.cache / "long_products")
+    facts = run.facts
     print(f"{facts['duration_s']:.0f} s, {facts['travelled_m']:.0f} m, {facts['estimates']} sweeps")
-    print(f"took {took_s:.0f} s: {facts['duration_s'] / took_s:.1f} times as fast as it was recorded")
-    odometry = [sample.memory_mb for sample in samples if sample.stages == 0]
+    print(f"took {run.took_s:.0f} s: {facts['duration_s'] / run.took_s:.1f} times as fast as it was recorded")
+    odometry = [sample.memory_mb for sample in run.of(0)]
     tenths = [max(odometry[k * len(odometry) // 10 : (k + 1) * len(odometry) // 10], default=0.0) for k in range(10)]
     print("odometry, MB by tenths: " + " ".join(f"{value:.0f}" for value in tenths))
     for stage, name in enumerate(("odometry", "fusion", "products")):
-        most = max((sample.memory_mb for sample in samples if sample.stages == stage), default=0.0)
-        print(f"{name}: at most {most:.0f} MB")
-
-
-def _watched(process: subprocess.Popen[str], state: Path) -> Iterator[Sample]:
-    begun_s = time.monotonic()
-    while process.poll() is None:
-        status = Path(f"/proc/{process.pid}/status")
-        try:
-            resident = status.read_text(encoding="ascii").split("VmRSS:")[1].split()[0]
-            stages = len(msgspec.json.decode(state.read_bytes())["stages"]) if state.exists() else 0
-        except (OSError, IndexError):
-            break  # it ended between the two looks
-        yield Sample(time.monotonic() - begun_s, stages, int(resident) / 1024.0)
-        time.sleep(1.0)
+        print(f"{name}: at most {run.most_mb(stage):.0f} MB")
 
 
 def _recording(options: argparse.Namespace) -> Path:
     path = options.cache / f"long_{options.scenario}_{options.hours:g}h.mcap"
-    if path.exists():
-        return path
-    world = build(scenario(options.scenario, 1))
-    one = walk(world.config, options.cache)
-    fixes = received(world, "honest", 1)
-    draft = path.with_suffix(".draft")
-    with draft.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.NONE)
-        writer.start("ros2", "mapforest")
-        used = channels(Topics())
-        ids = {}
-        for kind in (LidarScan, ImuSample, GnssFix):
-            channel = used[kind]
-            schema = writer.register_schema(channel.type_name, "ros2msg", schema_text(channel.type_name))
-            ids[kind] = writer.register_channel(channel.topic, "cdr", schema)
-        for message in _laps(one, fixes, int(options.hours * 3600 * SECOND_NS)):
-            writer.add_message(
-                ids[type(message)],
-                log_time=message.receive_ns,
-                data=ENCODERS[type(message)](message, message.stamp_ns),
-                publish_time=message.stamp_ns,
-            )
-        writer.finish()
-    draft.replace(path)
+    if not path.exists():
+        world = build(scenario(options.scenario, 1))
+        one = walk(world.config, options.cache)
+        fixes = received(world, "honest", 1)
+        write_recording(path, _laps(one, fixes, int(options.hours * 3600 * SECOND_NS)))
     return path
 
 

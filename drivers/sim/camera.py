@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 FRAME_NUMERATOR, FRAME_DENOMINATOR = 1001, 30000
 """29.97 frames a second, the camera's own rational."""
+PREVIEW_LATENCY_S = 0.12
+"""From exposure to the first packet of the preview. A real HERO8 needs 0.5 s and more."""
 
 
 def exposure_ns(index: int) -> int:

@@ -18,6 +18,7 @@ from random import Random
 from typing import TextIO
 
 from drivers.errors import SimulationError
+from drivers.sim.camera import PREVIEW_LATENCY_S
 from drivers.sim.faults import FaultPlan
 from drivers.sim.gopro_device import Hero8, Quirks
 from drivers.sim.gopro_line import BadLine, StreamClock
@@ -27,8 +28,6 @@ from drivers.sim.transport_mux import PACKET, TransportMux
 logger = logging.getLogger(__name__)
 FRAME_NS = (1001 * 1_000_000_000, 30_000)
 DATAGRAM = 7 * PACKET
-LATENCY_S = 0.12
-"""From exposure to the first datagram. A real HERO8 needs 0.5 s and more."""
 AHEAD = 15
 """Frames made ahead of their time."""
 TRUTH_EVERY = 3
@@ -159,7 +158,7 @@ class Emulator:
         index = 0
         while not self._stopping.is_set():
             # A camera that cannot keep up leaves frames out; it does not fall behind.
-            due = int((self._t_s() - LATENCY_S) * 1e9) * FRAME_NS[1] // FRAME_NS[0]
+            due = int((self._t_s() - PREVIEW_LATENCY_S) * 1e9) * FRAME_NS[1] // FRAME_NS[0]
             index = max(index, due)
             frame = (index, self._source.access_unit(index)[0])
             index += 1
@@ -194,7 +193,7 @@ class Emulator:
         if truth is not None and index % TRUTH_EVERY == 0:
             truth.write(json.dumps({"host_ns": self._epoch_ns + t_ns, "sensor_ns": sensor_ns}) + "\n")
             truth.flush()
-        self._due_s = max(self._due_s, self._epoch_ns / 1e9 + t_s + LATENCY_S + self._line.delay_s(t_s))
+        self._due_s = max(self._due_s, self._epoch_ns / 1e9 + t_s + PREVIEW_LATENCY_S + self._line.delay_s(t_s))
         self._stopping.wait(max(0.0, self._due_s - time.monotonic()))
         self._stream(index, unit, sensor_ns * 9 // 100_000, t_s)
 

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from drivers.errors import SimulationError
-from drivers.sim.camera import Camera
+from drivers.sim.camera import PREVIEW_LATENCY_S, Camera
 from drivers.sim.faults import SENSORS, Fault, FaultPlan
 from drivers.sim.gnss import ReceiverModel
 from drivers.sim.gnss_errors import PRESETS
@@ -54,6 +54,7 @@ class PayloadConfig:
                 "address": self.gopro_address[0],
                 "http_port": self.gopro_address[1],
                 "host": "127.0.0.1",
+                "latency_ms": 1e3 * PREVIEW_LATENCY_S,  # as a crew measures it, once for a unit
             },
         }
         return {name: tables[name] for name in self.sensors}

@@ -6,13 +6,13 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from edge.control.messages import Detecting, Location
+from edge.control.messages import Detecting, Location, Mapped
 from edge.errors import FormatError
 from edge.recording.messages import Detections, GnssPose, OdometryPose, Transforms
 
-Result: TypeAlias = OdometryPose | GnssPose | Transforms | Detections | Location | Detecting
+Result: TypeAlias = OdometryPose | GnssPose | Transforms | Detections | Location | Detecting | Mapped
 _KINDS: dict[str, type[Any]] = {
-    kind.__name__: kind for kind in (OdometryPose, GnssPose, Transforms, Detections, Location, Detecting)
+    kind.__name__: kind for kind in (OdometryPose, GnssPose, Transforms, Detections, Location, Detecting, Mapped)
 }
 
 

@@ -13,13 +13,14 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 import zmq
 
 from edge.bus import results
 from edge.bus.envelope import Envelope, subscription
 from edge.config import Config
-from edge.control.messages import Detecting, Location
+from edge.control.messages import Detecting, Location, Mapped
 from edge.errors import FormatError
 from edge.paths import BUS_NAME, RESULTS_NAME
 from edge.recording.messages import Recordable
@@ -28,6 +29,7 @@ from edge.ros.topics import Channel, channels
 
 log = logging.getLogger(__name__)
 
+WordT = TypeVar("WordT", Location, Detecting, Mapped)
 QUEUE_LENGTH = 512
 """Two seconds of everything."""
 HIGH_WATER = 400
@@ -52,8 +54,7 @@ class BusServer:
         self._queue: deque[tuple[int, Recordable]] = deque()
         self._sequence: Counter[type] = Counter()
         self._subscribed: set[bytes] = set()
-        self._location: tuple[float, Location] | None = None
-        self._detecting: tuple[float, Detecting] | None = None
+        self._words: dict[type, tuple[float, Any]] = {}
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -95,20 +96,27 @@ class BusServer:
     @property
     def location(self) -> Location | None:
         """The pipeline's last word; None when it has been silent. Any thread."""
-        known = self._location
-        return known[1] if known is not None and time.monotonic() - known[0] < _STALE_S else None
+        return self._word(Location)
 
     @property
     def detecting(self) -> Detecting | None:
         """The detector's, likewise."""
-        known = self._detecting
-        return known[1] if known is not None and time.monotonic() - known[0] < _STALE_S else None
+        return self._word(Detecting)
+
+    @property
+    def mapped(self) -> Mapped | None:
+        """The grounding's, likewise."""
+        return self._word(Mapped)
 
     def stop(self) -> None:
         """Close the sockets. Idempotent."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join(2.0)
+
+    def _word(self, kind: type[WordT]) -> WordT | None:
+        told_s, word = self._words.get(kind, (-_STALE_S, None))
+        return word if time.monotonic() - told_s < _STALE_S else None
 
     def _wants(self, kind: type) -> bool:
         channel = self._channels.get(kind)
@@ -159,9 +167,7 @@ class BusServer:
         except FormatError as error:
             log.warning("bus: %s", error)
             return
-        if isinstance(result, Location):
-            self._location = time.monotonic(), result
-        elif isinstance(result, Detecting):
-            self._detecting = time.monotonic(), result
+        if isinstance(result, Location | Detecting | Mapped):
+            self._words[type(result)] = time.monotonic(), result
         else:
             self._sink(result)

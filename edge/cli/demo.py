@@ -21,23 +21,26 @@ from edge.cli.ending import end_with_the_terminal
 from edge.cli.evaluate import clock_table
 from edge.cli.stage_bar import StageBar
 from edge.cli.trajectories import show
+from edge.cli.trees import show as show_trees
 from edge.config import load
 from edge.control.client import ControlClient
 from edge.control.messages import Status, Verdict
 from edge.process.against_truth import find_pairs
 from edge.process.process import Done, Task, process
+from edge.process.trees_against_truth import ComparedTrees, compare_trees
+from edge.report.report import write_report
 from edge.validation.clock_truth import ClockReport, clock_reports
 from pipeline.evaluation.pair import Compared, compare
 from pipeline.products.comparison import write_comparison
 
-HELP = """the whole mission on the emulated payload: record a walk, validate, locate, find trees, compare with the truth
+HELP = """the whole mission on the emulated payload: record a walk, validate it, map it, compare with the truth
 
 example: mapforest demo --seed 3
          mapforest demo --tui      (press the keys yourself: space starts, space twice stops, q leaves)
 
 Three emulated sensors speak their real protocols from one simulated forest; a recorder records them as on the
-payload, and the live pipeline finds the way and Tree-of-Heaven beside it, with a detector that knows the simulated
-forest only. It takes about two minutes. The outputs stay in the folder demo/."""
+payload, and the live pipeline finds the way and the trees beside it, with a detector that knows the simulated forest
+only. Then the recording is turned into maps and a report. The outputs stay in the folder demo/."""
 RPE_OVER_M = 10.0
 """The walk of the demonstration is 43 m long."""
 _EXIT = {"PASS": exit_codes.GOOD, "WARN": exit_codes.WARNINGS, "FAIL": exit_codes.FAILED}
@@ -73,22 +76,21 @@ def run(args: argparse.Namespace) -> int:
             return exit_codes.GOOD
         folder, verdict = _mission(client, payload, console)
     done, poses = _locate(folder, stage, quiet=args.json)
+    report, trees = _report(folder, stage, console, done)
     reports = clock_reports(folder, stage.truth)
     if args.json:
-        told = {
-            "session": str(folder),
-            "verdict": verdict,
-            "clocks": reports,
-            "trajectory": poses,
-            "detection": done.facts.detection,
-        }
+        told = {"session": str(folder), "verdict": verdict, "clocks": reports, "trajectory": poses, "trees": trees}
+        told["detection"] = done.facts.detection
         print(msgspec.json.encode(told).decode())
     else:
         show(console, poses)
+        if trees is not None:
+            show_trees(console, trees)
         _conclude(console, folder, verdict, reports)
         if (found := done.facts.detection) is not None:
             counted = f"{found.boxes} boxes in {found.images} images, by {found.model.name}"
             console.print(f"detection   {counted} (for demonstration only)", highlight=False)
+        console.print(f"report      {report}  (verdict, map, trees: start here)", highlight=False)
         console.print(f"products    {done.folder}", highlight=False)
         for name, meaning in done.facts.files.items():
             console.print(f"            {name}  {meaning}", highlight=False)
@@ -116,6 +118,15 @@ def _locate(folder: Path, stage: demo.Stage, *, quiet: bool) -> tuple[Done, list
     pairs = find_pairs(folder, stage.truth)
     write_comparison(stage.plots, f"Trajectories of {folder.name}", pairs)
     return done, compare(pairs, RPE_OVER_M)
+
+
+def _report(folder: Path, stage: demo.Stage, console: Console, done: Done) -> tuple[Path, ComparedTrees | None]:
+    """The session's page; and the mapped trees beside the true ones, where a detector looked."""
+    config = load(stage.config)
+    with console.status("drawing the report, and looking through the true forest for what the camera saw ..."):
+        report = write_report(Task([folder]), config)
+        looked = done.facts.findings is not None
+        return report, compare_trees(folder, stage.truth, config.grounding.probable) if looked else None
 
 
 def _operate(stage: demo.Stage) -> None:

@@ -25,6 +25,7 @@ example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth --page plots.html
          mapforest evaluate trajectory estimate.tum --truth truth.tum --over 50
+         mapforest evaluate trees demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate detection models/ailanthus.onnx datasets/autumn --page curves.html --worst worst.jpg
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
@@ -32,6 +33,7 @@ trajectory: what `mapforest process` made of a session and what the live pipelin
 the emulated payload's truth or another TUM file in the same time: APE and RPE (as in evo) as it is, and laid over the
 truth by yaw or in all axes; NEES (1 is honest). Live and offline are compared on the Earth: how far they are apart, and
 whether their covariances allow for that.
+trees: the trees that `mapforest process` mapped, against those of the simulated forest that the camera saw.
 detection: an ONNX model ("demo" for ours), or a folder of another program's predictions (YOLO texts with confidences),
 against a folder with images/, labels/, classes.txt and, to be told by site, sites.csv (image,site): precision, recall
 and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew."""
@@ -39,7 +41,7 @@ and F1 at one confidence, average precisions as COCO's, confusion, intervals fro
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("what", choices=["clocks", "trajectory", "detection"], help="what to evaluate")
+    parser.add_argument("what", choices=["clocks", "trajectory", "trees", "detection"], help="what to evaluate")
     parser.add_argument(
         "estimate",
         type=Path,
@@ -53,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--settle", type=float, default=10.0, metavar="S", help="clocks: leave out this much of an epoch"
     )
     parser.add_argument("--over", type=float, default=100.0, metavar="M", help="trajectory: stretches of the RPE")
-    parser.add_argument("--page", type=Path, metavar="FILE", help="also write plots, as one HTML page (not of clocks)")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="also write plots, as one HTML page")
     parser.add_argument("--worst", type=Path, metavar="FILE", help="detection: the worst images in one JPEG or PNG")
     parser.add_argument(
         "--confidence",
@@ -75,6 +77,8 @@ def run(args: argparse.Namespace) -> int:
         return _trajectory(args)
     if args.page is not None:
         raise UsageError("--page: there are plots of trajectories and of detections only")
+    if args.what == "trees":
+        return _trees(args)
     reports = clock_reports(args.estimate, args.truth, args.settle)
     if args.json:
         print(msgspec.json.encode(reports).decode())
@@ -92,6 +96,18 @@ def _trajectory(args: argparse.Namespace) -> int:
     found = compare(pairs, args.over)
     if args.page is not None:
         _write_page(args.page, args.estimate, pairs)
+    if args.json:
+        print(msgspec.json.encode(found).decode())
+    else:
+        show(console(), found)
+    return exit_codes.GOOD
+
+
+def _trees(args: argparse.Namespace) -> int:
+    from edge.cli.trees import show
+    from edge.process.trees_against_truth import compare_trees
+
+    found = compare_trees(args.estimate, args.truth, load(args.config).grounding.probable)
     if args.json:
         print(msgspec.json.encode(found).decode())
     else:

@@ -11,8 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from edge.cli import exit_codes
-from edge.cli.words import console, date, duration, size
+from edge.cli.words import console
 from edge.validation.info import Info, TopicInfo, info
+from edge.words import date, duration, size
 
 HELP = """list topics, types, counts and rates of a recording
 

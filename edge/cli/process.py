@@ -12,12 +12,13 @@ from rich.markup import escape
 
 from edge.cli import exit_codes
 from edge.cli.stage_bar import StageBar
-from edge.cli.words import console, duration
+from edge.cli.words import console
 from edge.config import Config, load
 from edge.errors import UsageError
+from edge.words import duration
 
 if TYPE_CHECKING:  # heavy: numpy, numba
-    from edge.process.products_stage import ProductFacts
+    from edge.process.product_facts import ProductFacts
     from edge.replay.geometry import Matrix
 
 HELP = """odometry, GNSS fusion, detection and products from a recording, faster than real time

@@ -12,7 +12,7 @@ import msgspec
 from edge.cli import exit_codes
 from edge.cli.asking import connect
 from edge.control.client import ControlClient
-from edge.control.messages import Detecting, Gnss, Host, Location, Recording, Sensor, Status, Verdict
+from edge.control.messages import Detecting, Gnss, Host, Location, Mapped, Recording, Sensor, Status, Verdict
 
 HELP = """show what the recorder does and how the sensors are
 
@@ -51,6 +51,8 @@ def lines(status: Status) -> Iterator[str]:
         yield _location_line(status.location)
     if status.detecting:
         yield _detecting_line(status.detecting)
+    if status.mapped:
+        yield _mapped_line(status.mapped)
     yield from _host_lines(status.host)
     if status.verdict:
         yield from _verdict_lines(status.verdict)
@@ -126,6 +128,13 @@ def _detecting_line(detecting: Detecting) -> str:
             f"{detecting.boxes} boxes in the last second"
         )
     return f"{line}  {detecting.note}".rstrip()
+
+
+def _mapped_line(mapped: Mapped) -> str:
+    line = f"trees    {mapped.trees} found in {mapped.views} images"
+    if mapped.range_m is not None:
+        line += f", the last {mapped.range_m:.1f} m away at {mapped.bearing_deg:.0f} degrees right of ahead"
+    return line
 
 
 def _gnss_line(gnss: Gnss) -> str:

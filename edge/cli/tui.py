@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--socket", type=Path, metavar="PATH", help="the recorder's control socket, if not the usual one"
     )
     parser.add_argument("--sun", action="store_true", help="black on white, against glare (key C)")
-    parser.add_argument("--bell", action="store_true", help="ring the terminal's bell on a new fault (key B)")
+    parser.add_argument("--bell", action="store_true", help="ring the terminal's bell on a new fault or tree (key B)")
     parser.add_argument("--ascii", action="store_true", help="plain characters, for terminals without the symbols")
 
 

@@ -11,10 +11,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from edge.cli import exit_codes
-from edge.cli.words import console, date, duration, size
+from edge.cli.words import console
 from edge.config import load
 from edge.validation.report import Level, Report, TopicReport
 from edge.validation.validate import validate
+from edge.words import date, duration, size
 
 HELP = """judge a recording: topics, rates, gaps, losses, clocks, GNSS
 

@@ -1,8 +1,6 @@
-"""Figures as people read them."""
+"""Where the commands print."""
 
 from __future__ import annotations
-
-from datetime import datetime, timezone
 
 from rich.console import Console
 
@@ -13,26 +11,3 @@ def console(*, stderr: bool = False) -> Console:
     """Where to print. Into a pipe lines are not folded to the width of a terminal that is not there."""
     out = Console(stderr=stderr)
     return out if out.is_terminal else Console(stderr=stderr, width=_PIPED_WIDTH)
-
-
-def size(octets: int) -> str:
-    """Bytes, in the unit that leaves one to four digits."""
-    amount = float(octets)
-    for unit in ("B", "kB", "MB"):
-        if amount < 1000:
-            return f"{amount:.0f} {unit}" if unit == "B" else f"{amount:.1f} {unit}"
-        amount /= 1000
-    return f"{amount:.2f} GB"
-
-
-def duration(seconds: float) -> str:
-    """1.5 s, 2 min 05 s, 1 h 02 min."""
-    if seconds < 60:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
-
-
-def date(utc_ns: int) -> str:
-    """UTC to the second."""
-    return f"{datetime.fromtimestamp(utc_ns // 1_000_000_000, timezone.utc):%Y-%m-%d %H:%M:%S} UTC"

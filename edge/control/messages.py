@@ -166,6 +166,18 @@ class Detecting(msgspec.Struct, frozen=True):
     """What is wrong, in words."""
 
 
+class Mapped(msgspec.Struct, frozen=True):
+    """What the live grounding says; of the tree found last its range now, bearing clockwise from ahead, and sigma."""
+
+    trees: int
+    """Probable ones."""
+    views: int
+    """Images that were put on the map."""
+    range_m: float | None = None
+    bearing_deg: float = 0.0
+    sigma_m: float = 0.0
+
+
 class Verdict(msgspec.Struct, frozen=True):
     """The validator's word on the last session: PASS, WARN or FAIL, with the reasons, worst first."""
 
@@ -194,6 +206,8 @@ class Status(msgspec.Struct, frozen=True, tag="status"):
     """None without a live pipeline."""
     detecting: Detecting | None = None
     """None without a live detector."""
+    mapped: Mapped | None = None
+    """Likewise."""
 
 
 Line = Request | Reply | Status

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from edge.config import Config
 from edge.errors import FormatError
 from edge.process.process import Task
-from edge.process.products_stage import ProductFacts
+from edge.process.product_facts import ProductFacts
 from edge.replay.poses import read_live_poses
 from pipeline.evaluation.trajectory import Trajectory, read_tum
 from pipeline.gnss.geodesy import Datum, geodetic

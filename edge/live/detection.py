@@ -17,6 +17,7 @@ from edge.errors import EdgeError
 from edge.live.looker import Bus, Looker
 from edge.recording.calibration import load_calibration
 from pipeline.detection.errors import DetectionError
+from pipeline.detections import FrameDetections
 
 log = logging.getLogger(__name__)
 
@@ -44,6 +45,14 @@ class LiveDetection:
         """For the operator. Any thread."""
         looker = self._looker
         return looker.state if looker is not None else self._loading
+
+    def found(self) -> list[FrameDetections]:
+        """Images that were looked at since the last call. Any one thread."""
+        looker = self._looker
+        taken = []
+        while looker is not None and looker.found:
+            taken.append(looker.found.popleft())
+        return taken
 
     def start(self, stop: threading.Event) -> None:
         """Until `stop` is set."""

@@ -29,6 +29,7 @@ SILENT_S = 2.0
 """Without video for so long, the operator is told."""
 FEEL_S = 2.0
 RATE_OVER_S = 5.0
+MOST_FOUND = 16
 
 
 class Bus(Protocol):
@@ -71,6 +72,8 @@ class Looker:
         self._looked, self._latency_ns = 0, 0
         self._arrived_ns, self._felt_ns = clock(), 0
         self._problem = ""
+        self.found: deque[FrameDetections] = deque(maxlen=MOST_FOUND)
+        """Images that were looked at, for whoever takes them; `popleft` from any thread."""
         self.state = self._told()
 
     def step(self, bus: Bus) -> None:
@@ -113,6 +116,7 @@ class Looker:
             return
         now_ns = self._clock()
         bus.send(message(found, now_ns))
+        self.found.append(found)
         self._problem = ""
         self._looked += 1
         self._latency_ns = now_ns - frame.stamp_ns

@@ -22,15 +22,17 @@ from edge.live.governor import Governor
 from edge.live.intake import LiveIntake
 from edge.live.poses import gnss_pose, odometry_pose, transforms
 from edge.process.estimators import Estimators, estimators, fusion_config, odometry_config
-from edge.recording.calibration import load_calibration
+from edge.recording.calibration import Calibration, load_calibration
 from edge.replay.geometry import find_geometry
 from edge.replay.pairing import Pairing, Sweep
 from edge.ros.frames import BASE_LINK, LIDAR
+from pipeline.detections import FrameDetections
 from pipeline.estimates import GlobalPose, OdometryEstimate
 from pipeline.odometry.warm import warm_up
 
 if TYPE_CHECKING:
     from edge.live.detection import LiveDetection
+    from edge.live.grounding import LiveGrounding
 
 log = logging.getLogger(__name__)
 
@@ -49,25 +51,35 @@ class Bus(Protocol):
     def send(self, result: Result) -> None: ...
 
 
+class Eye(Protocol):
+    """`LiveDetection`, as far as it is used here."""
+
+    @property
+    def state(self) -> Detecting: ...
+    def found(self) -> list[FrameDetections]: ...
+
+
 class LivePipeline:
-    """Odometry and fusion in host time, for as long as the recorder sends. One thread."""
+    """Odometry, fusion and grounding in host time, for as long as the recorder sends. One thread."""
 
     def __init__(
         self,
         config: Config,
         load: Callable[[], Estimators] = estimators,
         clock: Callable[[], int] = time.monotonic_ns,
-        detecting: Callable[[], Detecting] | None = None,
+        eye: Eye | None = None,
     ) -> None:
-        """detecting: what the detector beside it says, where there is one."""
-        transforms_ = load_calibration(config.calibration).transforms
+        """eye: the detector beside it, where there is one."""
+        calibration = load_calibration(config.calibration)
+        transforms_ = calibration.transforms
         geometry = find_geometry(transforms_, transforms_, BASE_LINK, LIDAR, livox=True)
         built = load()
         self._odometry = built.odometry(odometry_config(config, geometry))
         self._fusion = built.fusion(fusion_config(config, geometry))
         self._intake = LiveIntake(config.topics)
         self._clock = clock
-        self._detecting = detecting
+        self._eye = eye
+        self._grounding = _grounding(config, calibration) if eye is not None else None
         self._pairing = Pairing()
         self._governor = Governor()
         self._estimate: OdometryEstimate | None = None
@@ -92,12 +104,16 @@ class LivePipeline:
         sweep = self._governor.next()
         if sweep is not None:
             self._work(sweep, bus)
+        if self._eye is not None and self._grounding is not None:
+            for found in self._eye.found():
+                self._grounding.see(found)
         now_ns = self._clock()
         if now_ns - self._told_ns > TELL_S * 1e9:
             self._told_ns = now_ns
             bus.send(self.location(now_ns))
-            if self._detecting is not None:
-                bus.send(self._detecting())
+            if self._eye is not None and self._grounding is not None:
+                bus.send(self._eye.state)
+                bus.send(self._grounding.mapped(self._estimate))
 
     def location(self, now_ns: int) -> Location:
         """For the operator."""
@@ -134,6 +150,8 @@ class LivePipeline:
         began_ns = self._clock()
         for tracked in self._odometry.process(sweep):
             self._tell(tracked.estimate, bus)
+            if self._grounding is not None:
+                self._grounding.track(tracked)
         self._governor.took((self._clock() - began_ns) / 1e9)
 
     def _tell(self, estimate: OdometryEstimate, bus: Bus) -> None:
@@ -152,7 +170,7 @@ def serve(config: Config, folder: Path, stop: threading.Event) -> None:
     The kernels are compiled first: what came meanwhile would be lost, and the start of a walk with it.
     """
     detection = _detection(config, folder)
-    pipeline = LivePipeline(config, detecting=None if detection is None else lambda: detection.state)
+    pipeline = LivePipeline(config, eye=detection)
     if detection is not None:
         detection.start(stop)
     log.info("loading the compiled kernels (the first time on a machine they are compiled: a minute)")
@@ -164,6 +182,16 @@ def serve(config: Config, folder: Path, stop: threading.Event) -> None:
         log.info("live pipeline ends; messages lost on the bus: %s", lost)
     if detection is not None:
         detection.join()
+
+
+def _grounding(config: Config, calibration: Calibration) -> LiveGrounding:
+    from edge.live.grounding import LiveGrounding  # noqa: PLC0415 - OpenCV, as below
+    from edge.replay.rig import camera_rig  # noqa: PLC0415
+    from pipeline.grounding.warm import warm_up as warm_up_grounding  # noqa: PLC0415
+
+    warm_up_grounding()
+    rig = camera_rig(calibration, calibration.transforms, config.calibration)
+    return LiveGrounding(rig, config.grounding)
 
 
 def _detection(config: Config, folder: Path) -> LiveDetection | None:

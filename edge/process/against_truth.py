@@ -8,11 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from edge.config import Config
 from edge.errors import FormatError
-from edge.process.products_stage import ProductFacts
+from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
 from edge.replay.poses import LivePoses, read_live_poses
 from pipeline.evaluation.pair import ALIGNMENTS, Pair
 from pipeline.evaluation.trajectory import Alignment, Trajectory, read_tum, together
@@ -40,11 +38,11 @@ def find_pairs(target: Path, truth: Path, config: Config | None = None) -> list[
 
 
 def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
-    folder = _products_folder(target)
-    facts = msgspec.json.decode((folder / "products.json").read_bytes(), type=ProductFacts)
-    true = _plain_truth(truth) if truth.is_file() else _simulated(truth, facts)
+    folder = products_folder(target)
+    facts = read_facts(folder)
+    true = _plain_truth(truth) if truth.is_file() else simulated_way(truth, facts)
     here = Datum(*facts.datum) if facts.datum is not None else None
-    goal = here if truth.is_file() else _world(truth)
+    goal = here if truth.is_file() else world_datum(truth)
     offline = _offline(folder)
     if offline is not None and here is not None and goal is not None:
         offline = _in_map(offline.moved(here.turn, here.origin_m), goal)
@@ -74,8 +72,8 @@ def _offline(products: Path) -> Trajectory | None:
     if not (products / "trajectory.tum").exists():
         return None
     found = read_tum(products / "trajectory.tum")
-    stamps, covariance = read_covariance(products / "covariance.csv")
-    return replace(found, covariance=covariance) if len(stamps) == len(found.stamps_ns) else found
+    poses = read_covariance(products / "covariance.csv")
+    return replace(found, covariance=poses.covariance[:, :3, :3]) if len(poses) == len(found.stamps_ns) else found
 
 
 def _in_map(earth: Trajectory, datum: Datum) -> Trajectory:
@@ -89,23 +87,29 @@ def _plain_truth(path: Path) -> Trajectory:
     return read_tum(path)
 
 
-def _simulated(folder: Path, facts: ProductFacts) -> Trajectory:
+def simulated_way(folder: Path, facts: ProductFacts) -> Trajectory:
     """The emulated payload's poses in session time."""
+    return read_tum(folder / "poses.tum").shifted(walk_begins_ns(folder, facts))
+
+
+def walk_begins_ns(folder: Path, facts: ProductFacts) -> int:
+    """Session time of the emulated walk's t = 0."""
     epoch_ns = int(_json(folder / "epoch.json", "monotonic_ns"))
     if facts.host_offset_ns is None:
         raise FormatError(f"{facts.session} was not recorded by mapforest: its time cannot be put to the simulation's")
-    return read_tum(folder / "poses.tum").shifted(epoch_ns + facts.host_offset_ns)
+    return epoch_ns + facts.host_offset_ns
 
 
-def _world(truth: Path) -> Datum:
+def world_datum(truth: Path) -> Datum:
     """Where the simulated world lies."""
     world = _json(truth / "world.json", "datum")
     return Datum(world["latitude_deg"], world["longitude_deg"], world["height_m"])
 
 
-def _products_folder(target: Path) -> Path:
+def products_folder(target: Path) -> Path:
+    """Of a session, or itself. FormatError where there are none."""
     for folder in (target, target / "products"):
-        if (folder / "products.json").exists():
+        if (folder / PRODUCTS_JSON).exists():
             return folder
     raise FormatError(f"{target}: not processed yet; run `mapforest process {target}` first")
 

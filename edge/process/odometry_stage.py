@@ -40,6 +40,7 @@ class OdometryFacts(msgspec.Struct):
     damages: tuple[str, ...] = ()
     host_offset_ns: int | None = None
     """Session time minus the recording computer's monotonic time; None in recordings of others."""
+    operator: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +75,7 @@ class OdometryStage:
         facts.late_scans, facts.late_samples = pairing.left.scans, pairing.left.samples
         facts.notes, facts.damages = self.replay.notes, self.replay.damages
         facts.host_offset_ns = _host_offset_ns(self.replay.facts)
+        facts.operator = self.replay.facts.get("operator", "")
         facts.seconds = time.monotonic() - started_s
         (folder / FACTS).write_bytes(msgspec.json.encode(facts))
         return facts

@@ -17,18 +17,20 @@ from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
 from edge.process.estimators import Estimators, estimators, fusion_config, odometry_config
 from edge.process.fusion_stage import FusionStage
 from edge.process.odometry_stage import OdometryFacts, OdometryStage
-from edge.process.products_stage import ProductFacts, ProductsStage
+from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
+from edge.process.products_stage import ProductsStage
 from edge.process.watch import Watch
 from edge.replay.replay import Replay, ReplayOptions
+from edge.replay.rig import camera_rig, recorded_calibration
 from edge.validation.files import recording_files
 
 if TYPE_CHECKING:  # heavy: OpenCV
     from pipeline.detection.detector import Detector
 
-STAGES = ("odometry", "fusion", "detection", "products")
+STAGES = ("odometry", "fusion", "detection", "grounding", "products")
 ANTENNA = "antenna.json"
 """Where the recording says the antenna is: the fusion does not open it again."""
-_FORMAT = 1
+_FORMAT = 2
 """Of the files between the stages."""
 
 
@@ -70,7 +72,7 @@ class Done:
 def process(
     task: Task, config: Config, watch: Watch | None = None, load: Callable[[], Estimators] = estimators
 ) -> Done:
-    """Odometry, fusion, detection where a model is configured, products.
+    """Odometry, fusion; detection and grounding where a model is configured; products.
 
     FormatError for what cannot be used, EdgeError where nothing could be estimated, DetectionError for a wrong model.
     """
@@ -104,10 +106,11 @@ class _Work:
         self._stage("fusion", fusion, self._fusion)
         if detection:
             self._stage("detection", detection, self._detection)
-        last = key_of(fusion, detection, self.task.session)
-        self._stage("products", last, self._products, [self.task.folder / "products.json"])
-        facts = msgspec.json.decode((self.task.folder / "products.json").read_bytes(), type=ProductFacts)
-        return Done(self.task.folder, facts, tuple(self.redone))
+            detection = key_of(fusion, detection, self.config.grounding)
+            self._stage("grounding", detection, self._grounding)
+        last = key_of(fusion, detection, self.config.products, self.task.session)
+        self._stage("products", last, self._products, [self.task.folder / PRODUCTS_JSON])
+        return Done(self.task.folder, read_facts(self.task.folder), tuple(self.redone))
 
     def open_detector(self) -> Detector:
         """As configured. DetectionError."""
@@ -120,7 +123,8 @@ class _Work:
         pose = None if options.lidar_pose is None else options.lidar_pose.tolist()
         wanted = options.wanted
         asked = [wanted.lidar, wanted.imu, wanted.fix, options.time_field, pose, self.task.gnss]
-        settings = [self.config.odometry, self.config.products, self.config.topics, self.config.calibration]
+        tiles = (self.config.products.voxel_m, self.config.products.tile_m)
+        settings = [self.config.odometry, tiles, self.config.topics, self.config.calibration]
         first = key_of(_FORMAT, __version__, self.prints, asked, settings)
         return first, key_of(first, self.config.fusion)
 
@@ -163,11 +167,27 @@ class _Work:
         assert self.detector is not None
         DetectionStage(self.task.targets, self.config, self.detector).run(folder, self.watch.advance)
 
+    def _grounding(self, folder: Path) -> None:
+        from edge.process.grounding_stage import GroundingStage  # noqa: PLC0415
+        from edge.process.tree_pictures import write_pictures  # noqa: PLC0415
+        from edge.process.trees_file import PICTURES  # noqa: PLC0415
+
+        replay = Replay(self.task.targets, self.config, self.task.replay)
+        calibration = recorded_calibration(replay.facts, self.config.calibration)
+        rig = camera_rig(calibration, replay.static_transforms, self.config.calibration)
+        stage = GroundingStage(self.checkpoint.folder, rig, self.config.products.tile_m, self.config.grounding)
+        trees = stage.run(folder, self.watch.advance)
+        probable = [tree for tree in trees if tree.probability >= self.config.grounding.probable]
+        write_pictures(folder / PICTURES, probable, self.task.targets, self.config)
+
     def _products(self, _folder: Path) -> None:
         software = f"mapforest {__version__}"
-        voxel_m = self.config.products.voxel_m
-        detected = bool(self.config.detection.model)
-        stage = ProductsStage(self.checkpoint.folder, self.task.folder, voxel_m, self.task.session, software, detected)
+        work, findings = self.checkpoint.folder, None
+        if self.config.detection.model:
+            from edge.process.findings import read_findings  # noqa: PLC0415
+
+            findings = read_findings(work, self.config.grounding.probable)
+        stage = ProductsStage(work, self.task.folder, self.config.products, self.task.session, software, findings)
         stage.run(self.watch.advance)
 
 

@@ -46,6 +46,11 @@ def find_geometry(
     return Geometry(lidar, nominal[GNSS_ANTENNA] if antenna is None else antenna, tuple(notes))
 
 
+def find_pose(transforms: Iterable[Transform], frame: str, of: str) -> Matrix | None:
+    """Pose (4, 4) of one frame in another, None where no way leads there."""
+    return _Tree(transforms).pose(frame, of)
+
+
 class _Tree:
     """Transforms as edges that can be walked both ways."""
 

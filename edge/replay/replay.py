@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
@@ -120,12 +121,18 @@ class Replay:
     def _some(self, topic: str, ordinals: Sequence[int]) -> Iterator[Raw]:
         return self._store.some(topic, ordinals)
 
-    def _geometry(self, config: Config, options: ReplayOptions) -> Geometry:
+    @cached_property
+    def static_transforms(self) -> list[Transform]:
+        """Of /tf_static."""
         recorded: list[Transform] = []
         if self.topics.tf_static:
             for raw in self._store.some(self.topics.tf_static, range(20)):
                 recorded += [transform for _, transform in decode_transforms(raw.data)]
+        return recorded
+
+    def _geometry(self, config: Config, options: ReplayOptions) -> Geometry:
         usual = load_calibration(config.calibration).transforms
+        recorded = self.static_transforms
         found = find_geometry(recorded, usual, self._imu.frame_id, self._clouds.frame_id, livox=self._clouds.livox)
         return found if options.lidar_pose is None else Geometry(options.lidar_pose, found.antenna)
 

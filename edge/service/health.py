@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from drivers.driver import SensorHealth, SensorState
 from edge.config import Config
-from edge.control.messages import Detecting, Host, Location, Recording, Status
+from edge.control.messages import Detecting, Host, Location, Mapped, Recording, Status
 from edge.paths import recordings_folder
 from edge.recording.account import RecordingStatus
 from edge.recording.disk import Disk, Space, floor_bytes
@@ -47,6 +47,23 @@ class _Look:
     alive: bool
 
 
+class Words(Protocol):
+    """`BusServer`, as far as it is used here: the live pipeline's last words, None where there are none."""
+
+    @property
+    def location(self) -> Location | None: ...
+    @property
+    def detecting(self) -> Detecting | None: ...
+    @property
+    def mapped(self) -> Mapped | None: ...
+
+
+class Silence:
+    """No live pipeline."""
+
+    location = detecting = mapped = None
+
+
 class Health:
     """Looks with `look` about once a second; `status` is cheap: what was seen then, with the session as it is now."""
 
@@ -64,10 +81,8 @@ class Health:
     ) -> None:
         self.notices: list[str] = []
         """Standing problems of the service itself: no live view, a file that could not be repaired."""
-        self.location: Callable[[], Location | None] = lambda: None
-        """The live pipeline's last word."""
-        self.detecting: Callable[[], Detecting | None] = lambda: None
-        """The live detector's."""
+        self.pipeline: Words = Silence()
+        """What the live pipeline says."""
         self._config = config
         self._supervisor = supervisor
         self._intake = intake
@@ -99,7 +114,7 @@ class Health:
             not all_stuck and self._writes(recording, now_ns),
         )
         clock = SystemClock(self._steps.offset_ns, self._steps.steps, self._looked.discipline)
-        told = diagnostics(now_ns, sensors, self._looked.host, clock, recording, detecting=self.detecting())
+        told = diagnostics(now_ns, sensors, self._looked.host, clock, recording, detecting=self.pipeline.detecting)
         self._intake.take(told)
         return self._looked
 
@@ -119,8 +134,9 @@ class Health:
             recording=self._recording(recording) if recording else None,
             verdict=self._judge.verdict,
             problems=tuple(self._problems(looked, recording, now_ns)),
-            location=self.location(),
-            detecting=self.detecting(),
+            location=self.pipeline.location,
+            detecting=self.pipeline.detecting,
+            mapped=self.pipeline.mapped,
         )
 
     def summary(self) -> str:

@@ -12,7 +12,7 @@ from drivers import registry
 from drivers.driver import Driver
 from edge.bus.server import BusServer
 from edge.config import Config, sensor_driver, sensor_settings, to_toml
-from edge.control.messages import Detecting, Location, Reply, Request, Status
+from edge.control.messages import Reply, Request, Status
 from edge.paths import control_socket, recordings_folder
 from edge.recording.calibration import load_calibration
 from edge.recording.messages import Recordable
@@ -60,7 +60,8 @@ class Service:
         self._judge = judge or Judge(to_toml(config))
         self._recorder = Recorder(config, self._intake, self._supervisor, self._judge)
         self._health = Health(config, self._supervisor, self._intake, self._recorder, self._judge)
-        self._health.location, self._health.detecting = self._location, self._detecting
+        if self._bus is not None:
+            self._health.pipeline = self._bus
         self._server = ControlServer(control_socket(config), self, config.control.group, SOFTWARE)
         self._next_look_ns = 0
         self._told = ""
@@ -96,12 +97,6 @@ class Service:
 
     def _take(self, message: Recordable) -> None:
         self._intake.take(message)
-
-    def _location(self) -> Location | None:
-        return self._bus.location if self._bus is not None else None
-
-    def _detecting(self) -> Detecting | None:
-        return self._bus.detecting if self._bus is not None else None
 
     def _start(self) -> None:
         if self._bus is not None:

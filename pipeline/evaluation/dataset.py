@@ -9,7 +9,6 @@ sites.csv   image, site (optional): what was photographed in one place, or by on
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,14 +16,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.dataset.labels import Box, read_labels
 from pipeline.evaluation.errors import DatasetError
 
 Array = npt.NDArray[np.float64]
 IMAGES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp"})
 NOWHERE = "no site"
-_SLACK = 0.02
-"""Share of the image that a box may reach over its edge, by rounding or a hasty hand; it is clipped."""
-_BOX, _SURE_BOX, _POLYGON = 5, 6, 7
+WITHOUT_CONFIDENCE = 5
+"""Numbers of a line."""
 _TOLD = 3
 
 
@@ -98,51 +97,29 @@ def read_classes(path: Path) -> tuple[str, ...]:
 
 
 def read_boxes(path: Path | None, classes: int, *, predicted: bool = False) -> Boxes:
-    """None: nothing. predicted: with the confidence as a sixth number, as YOLO saves its results."""
-    rows = []
-    if path is not None:
-        try:
-            lines = path.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise DatasetError(f"{path}: cannot be read ({error})") from error
-        for number, line in enumerate(lines, 1):
-            if line.strip():
-                rows.append(_row(line.split(), classes, f"{path}:{number}", predicted=predicted))
-    values = np.array(rows, np.float64).reshape(-1, 6)
-    return Boxes(values[:, 1:5], values[:, 0].astype(np.int64), values[:, 5])
+    """None: nothing. predicted: with the confidence as a sixth number, as YOLO saves its results.
 
-
-def _row(words: Sequence[str], classes: int, where: str, *, predicted: bool) -> tuple[float, ...]:
+    DatasetError for a line that is no box: figures over a part of the labels would say something else.
+    """
+    if path is None:
+        return _boxes(())
     try:
-        number, *values = map(float, words)
-    except ValueError:
-        number, values = math.nan, []
-    if not all(map(math.isfinite, (number, *values))):
-        raise DatasetError(f"{where}: found {' '.join(words)[:60]!r}, expected numbers")
-    if not 0 <= number < classes or number % 1:
-        raise DatasetError(f"{where}: class {words[0]}, expected one of the {classes} in classes.txt, counted from 0")
-    sure = 1.0
-    if predicted:
-        if len(words) != _SURE_BOX:
-            raise DatasetError(f"{where}: {len(words)} numbers, expected 6: class cx cy w h confidence")
-        *values, sure = values
-    box = _outline(values, where)
-    if min(box) < -_SLACK or max(box) > 1.0 + _SLACK:
-        raise DatasetError(f"{where}: reaches far out of the image; expected shares of its width and height, 0 to 1")
-    left, top, right, bottom = (min(max(value, 0.0), 1.0) for value in box)
-    if right <= left or bottom <= top:
-        raise DatasetError(f"{where}: has no size; take the line out")
-    return number, left, top, right, bottom, sure
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DatasetError(f"{path}: cannot be read ({error})") from error
+    if predicted and any(len(line.split()) == WITHOUT_CONFIDENCE for line in text.splitlines()):
+        raise DatasetError(f"{path}: a box without a confidence; let YOLO save them too (`save_conf=True`)")
+    labels = read_labels(text, str(path), classes, predictions=predicted)
+    if labels.problems:
+        more = f" (and {len(labels.problems) - 1} more)" if len(labels.problems) > 1 else ""
+        raise DatasetError(labels.problems[0] + more)
+    return _boxes(labels.boxes)
 
 
-def _outline(values: Sequence[float], where: str) -> tuple[float, float, float, float]:
-    """Of a box by centre and size, or around a polygon."""
-    if len(values) == _BOX - 1:
-        cx, cy, width, height = values
-        return cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2
-    if len(values) >= _POLYGON - 1 and len(values) % 2 == 0:
-        return min(values[::2]), min(values[1::2]), max(values[::2]), max(values[1::2])
-    raise DatasetError(f"{where}: {1 + len(values)} numbers, expected 5 (class cx cy w h) or a polygon's 7, 9, 11, ...")
+def _boxes(held: Sequence[Box]) -> Boxes:
+    corners = np.array([box.corners for box in held], np.float64).reshape(-1, 4)
+    ids = np.array([box.class_id for box in held], np.int64)
+    return Boxes(corners, ids, np.array([box.confidence for box in held], np.float64))
 
 
 def _images(folder: Path) -> dict[str, Path | None]:

@@ -90,11 +90,11 @@ def _over_confidence(curve: Curve) -> Plot:
 
 
 def _table(title: str, what: str, rows: Mapping[str, Figures]) -> str:
-    return sheet.table(title, (what, *COLUMNS), [[name, *row(figures)] for name, figures in rows.items()])
+    return sheet.figures(title, (what, *COLUMNS), [[name, *row(figures)] for name, figures in rows.items()])
 
 
 def _confusion(report: DetectionReport) -> str:
     names = (*report.names, BACKGROUND)
     rows = [[name, *map(str, counts)] for name, counts in zip(names, report.confusion, strict=True)]
     caption = "Rows: what is there. Columns: what was said of it. Boxes are matched by where they are."
-    return sheet.table("What is taken for what", ("", *names), rows, caption)
+    return sheet.figures("What is taken for what", ("", *names), rows, caption)

@@ -31,6 +31,16 @@ class Site:
         """Of `utm`."""
         return pyproj.CRS.from_epsg(self.epsg)
 
+    @cached_property
+    def convergence_deg(self) -> float:
+        """Bearing of grid north at the datum, clockwise from true north: `map` has true north, UTM grid north."""
+        return self._convergence_and_scale[0]
+
+    @cached_property
+    def scale(self) -> float:
+        """Metres of the UTM grid at the datum for one on the ellipsoid."""
+        return self._convergence_and_scale[1]
+
     def geodetic(self, enu_m: Array) -> Array:
         """(n, 3) in `map` -> (n, 3) longitude, latitude (degrees), height (m)."""
         return np.column_stack(self._to_geodetic.transform(enu_m[:, 0], enu_m[:, 1], enu_m[:, 2]))
@@ -53,6 +63,23 @@ class Site:
         there = self.utm(ends)
         slopes = (there[:3] - there[3:]) / (2.0 * _STEP_M)
         return np.asarray(self.utm(middle[None]) + (enu_m - middle) @ slopes)
+
+    def from_geodetic(self, longitude_deg: Array, latitude_deg: Array) -> Array:
+        """(n, 2) east and north in `map` of places (n,) at the datum's height."""
+        height = np.full(len(longitude_deg), self.datum[2])
+        east, north, _ = self._to_geodetic.transform(longitude_deg, latitude_deg, height, direction="INVERSE")
+        return np.column_stack([east, north])
+
+    def from_utm(self, utm_m: Array) -> Array:
+        """(n, 2) easting, northing -> (n, 2) east and north in `map`, at the datum's height."""
+        longitude, latitude = self._to_utm.transform(utm_m[:, 0], utm_m[:, 1], direction="INVERSE")
+        return self.from_geodetic(np.asarray(longitude), np.asarray(latitude))
+
+    @cached_property
+    def _convergence_and_scale(self) -> tuple[float, float]:
+        latitude, longitude, _ = self.datum
+        factors = pyproj.Proj(self.crs).get_factors(longitude, latitude)
+        return float(factors.meridian_convergence), float(factors.meridional_scale)
 
     @cached_property
     def _to_geodetic(self) -> pyproj.Transformer:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.products.earth import Site
+from pipeline.products.findings import Evidence, PointEvidence
 from pipeline.products.tiles import Tile, read_tile, tiles
 from pipeline.products.track import Placement
 
@@ -22,6 +23,18 @@ _LEAP_S = 18
 """GPS minus UTC, since 2017; none is announced."""
 _ADJUSTED_S = 1_000_000_000
 """Adjusted standard GPS time counts from a billion seconds after the epoch (LAS 1.4, 2.4.1)."""
+NO_HEAT = -1.0
+"""Of points that no image showed; declared as no-data in the file."""
+_ALWAYS = (
+    laspy.ExtraBytesParams("sweep", "uint32", "ordinal in the trajectory"),
+    laspy.ExtraBytesParams("sigma_m", "float32", "of the pose, horizontal"),
+)
+_OF_EVIDENCE = (
+    laspy.ExtraBytesParams("heat", "float32", "probability; -1: not seen", no_data=np.array([NO_HEAT])),
+    laspy.ExtraBytesParams("label", "uint8", "0 none, 1 ailanthus"),
+    laspy.ExtraBytesParams("seen", "uint16", "images that showed the point"),
+)
+"""Descriptions have room for 32 bytes."""
 _LOCAL = "coordinates are local: metres from the start of the session, z up, heading arbitrary; no CRS"
 
 
@@ -35,6 +48,9 @@ class MapSource:
     sigma_m: npt.NDArray[np.float64]
     placement: Placement | None
     session: str
+    heights: str = "heights above the WGS 84 ellipsoid"
+    evidence: Evidence | None = None
+    """Of a detector: without it the points carry no heat, label and count."""
 
 
 def write_laz(path: Path, source: MapSource, advance: Callable[[float], None]) -> int:
@@ -46,8 +62,13 @@ def write_laz(path: Path, source: MapSource, advance: Callable[[float], None]) -
     with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
         for number, tile in enumerate(found):
             points = read_tile(source.tiles, tile, source.voxel_m)
+            told = source.evidence(tile, points) if source.evidence is not None else None
             for start in range(0, len(points), _AT_ONCE):
-                writer.write_points(_record(points[start : start + _AT_ONCE], header, source, site))
+                some = slice(start, start + _AT_ONCE)
+                record = _record(points[some], header, source, site)
+                if told is not None:
+                    _add_evidence(record, told, some)
+                writer.write_points(record)
             count += len(points)
             advance((number + 1) / len(found))
     return count
@@ -63,17 +84,20 @@ def _header(source: MapSource, site: Site | None, found: list[Tile]) -> laspy.La
     header.generating_software = "mapforest"
     header.system_identifier = "mapforest LiDAR map"
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
-    header.add_extra_dims(
-        [
-            laspy.ExtraBytesParams("sweep", "uint32", "ordinal in the trajectory"),
-            laspy.ExtraBytesParams("sigma_m", "float32", "of the pose, horizontal"),
-        ]
-    )
-    about = f"session {source.session}; " + ("heights above the WGS 84 ellipsoid" if site else _LOCAL)
+    header.add_extra_dims([*_ALWAYS, *(_OF_EVIDENCE if source.evidence is not None else ())])
+    _leave_bounds_open(header)
+    about = f"session {source.session}; " + (source.heights if site else _LOCAL)
     header.vlrs.append(laspy.VLR("LASF_Spec", 3, "Text Area Description", about.encode()[:65_000]))
     if site is not None:
         header.add_crs(site.crs)
     return header
+
+
+def _leave_bounds_open(header: laspy.LasHeader) -> None:
+    """laspy 2.7 takes the first value of each batch for the least and the greatest: better to say nothing."""
+    for vlr in header.vlrs.get("ExtraBytesVlr"):
+        for dimension in vlr.extra_bytes_structs:
+            dimension.options &= ~(dimension.MIN_BIT_MASK | dimension.MAX_BIT_MASK)
 
 
 def _record(
@@ -92,6 +116,13 @@ def _record(
     record["sweep"] = points["sweep"]
     record["sigma_m"] = source.sigma_m[sweeps].astype(np.float32)
     return record
+
+
+def _add_evidence(record: laspy.ScaleAwarePointRecord, told: PointEvidence, some: slice) -> None:
+    seen = told.seen[some]
+    record["heat"] = np.where(seen > 0, told.probability[some], np.float32(NO_HEAT))
+    record["label"] = told.label[some]
+    record["seen"] = seen
 
 
 def adjusted_gps_s(utc_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:

@@ -32,12 +32,24 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Dots:
-    """Single points."""
+    """Single points. labels: what stands beside each, or none at all."""
 
     x: Array
     y: Array
     name: str
     tone: str = "b"
+    labels: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Below the lines: an image of the page (`sheet.picture`) by its name, and where its edges lie."""
+
+    name: str
+    west: float
+    east: float
+    south: float
+    north: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +61,7 @@ class Plot:
     lines: Sequence[Line] = ()
     dots: Sequence[Dots] = ()
     bands: Sequence[tuple[float, float]] = ()
+    picture: Picture | None = None
     x_names: Sequence[str] = ()
     """Names of the x values 0, 1, 2, ... instead of numbers; y_names likewise."""
     y_names: Sequence[str] = ()
@@ -66,9 +79,11 @@ class Plot:
         legend = _legend([(one.name, one.tone) for one in self.marks if one.name], width)
         axes = _Axes.around(self, width, legend.height)
         most = int(_POINTS_A_PIXEL * width)
-        parts = [*axes.bands(self.bands), *axes.grid(self)]
+        parts = [axes.below(self.picture)] if self.picture is not None else []
+        parts += [*axes.bands(self.bands), *axes.grid(self)]
         parts += [_path(axes, line, most) for line in self.lines]
         parts += [_circles(axes, dots, most) for dots in self.dots]
+        parts += [text for dots in self.dots for text in _labels(axes, dots)]
         parts += legend.parts
         label = escape(f"{self.y_label} over {self.x_label}")
         return (
@@ -92,8 +107,12 @@ class _Axes:
 
     @classmethod
     def around(cls, plot: Plot, width: int, legend: int) -> _Axes:
-        x0, x1 = (-0.5, len(plot.x_names) - 0.5) if plot.x_names else _bounds([one.x for one in plot.marks])
-        y0, y1 = _bounds([one.y for one in plot.marks])
+        edges = plot.picture
+        wide, high = ([edges.west, edges.east], [edges.south, edges.north]) if edges else ([], [])
+        x0, x1 = _bounds([*(one.x for one in plot.marks), np.array(wide)])
+        y0, y1 = _bounds([*(one.y for one in plot.marks), np.array(high)])
+        if plot.x_names:
+            x0, x1 = -0.5, len(plot.x_names) - 0.5
         if plot.from_zero:
             y0 = min(0.0, y0)
         if plot.y_names:
@@ -112,6 +131,12 @@ class _Axes:
     def y(self, value: Array) -> Array:
         return self.height - BOTTOM - (value - self.y0) / (self.y1 - self.y0) * (self.height - self.top - BOTTOM)
 
+    def below(self, picture: Picture) -> str:
+        left, right = self.x(np.array([picture.west, picture.east])).tolist()
+        bottom, top = self.y(np.array([picture.south, picture.north])).tolist()
+        moved = f"translate({left:.1f} {top:.1f}) scale({right - left:.2f} {bottom - top:.2f})"
+        return f'<use href="#{picture.name}" transform="{moved}"/>'
+
     def bands(self, bands: Sequence[tuple[float, float]]) -> list[str]:
         found = []
         for start, end in bands:
@@ -124,7 +149,7 @@ class _Axes:
 
     def grid(self, plot: Plot) -> list[str]:
         parts = []
-        for value, text in _marked(plot.x_names, self.x0, self.x1, max(self.width // 110, 3)):
+        for value, text in _marked(plot.x_names, self.x0, self.x1, max(self.width // 110, 5)):
             at = float(self.x(np.array(value)))
             bottom = self.height - BOTTOM
             parts.append(f'<line class="grid" x1="{at:.1f}" x2="{at:.1f}" y1="{self.top}" y2="{bottom}"/>')
@@ -181,6 +206,11 @@ def _circles(axes: _Axes, dots: Dots, most: int) -> str:
     pairs = zip(axes.x(dots.x[::every]).tolist(), axes.y(dots.y[::every]).tolist(), strict=True)
     marks = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in pairs if math.isfinite(x + y))
     return f'<path class="dots {dots.tone}" d="{marks}"/>'
+
+
+def _labels(axes: _Axes, dots: Dots) -> list[str]:
+    places = zip(axes.x(dots.x).tolist(), axes.y(dots.y).tolist(), dots.labels, strict=False)
+    return [f'<text class="label" x="{x + 5:.1f}" y="{y - 4:.1f}">{escape(text)}</text>' for x, y, text in places]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,87 +1,149 @@
-"""The way as a line, and its poses as points, for QGIS (GeoPackage) and for Google Earth (KML)."""
+"""Layers for QGIS, QField and ArcGIS in a GeoPackage: the way and its poses, and what was found beside it."""
 
 from __future__ import annotations
 
-import struct
-from datetime import datetime, timezone
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import escape
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pyogrio.raw
+import shapely
 
+from pipeline.products.areas import on_the_grid
 from pipeline.products.earth import Site
+from pipeline.products.handout import Handout
+from pipeline.products.occurrences import UNVERIFIED, Columns, Survey, text
 from pipeline.products.simplify import simplified
+from pipeline.products.styles import layer_style
 
 Array = npt.NDArray[np.float64]
 _LINE_M = 0.1
 """The line leaves the way by at most this."""
-_WKB_POINT_Z, _WKB_LINE_Z = 1001, 1002
+_VERSION = "1.2"
+"""Of the GeoPackage standard: newer ones make GDAL of two years ago, and what is built on it, warn."""
+_LOCAL = (
+    'ENGCRS["local: metres from the start of the session, heading arbitrary",EDATUM["start of the session"],'
+    'CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]]'
+)
+"""Of a session that nobody could place on the Earth."""
+_NAMESPACE = uuid.UUID("3c0f1d86-2a2b-4d0e-8a41-52b7ce0a9f6d")
 
 
-def write_geopackage(
-    path: Path, site: Site, stamps_ns: npt.NDArray[np.int64], enu_m: Array, columns: dict[str, Array]
-) -> None:
-    """Layers `way` (one line) and `poses` (points with time and `columns`, each (n,)), in the site's UTM zone."""
+@dataclass(frozen=True, slots=True)
+class _Layer:
+    """kind: of its shapes, None for a table without any."""
+
+    name: str
+    kind: str | None = None
+    crs: str | None = None
+    about: str = ""
+
+
+def write_way(path: Path, survey: Survey, columns: Columns, told: Mapping[str, Any]) -> None:
+    """Begin a GeoPackage with `track`, one line that says what is `told`, and `poses`, points with time and `columns`.
+
+    In the site's UTM zone, or local. columns: (n,) each.
+    """
     path.unlink(missing_ok=True)
-    utm = site.utm(enu_m)
-    kept = simplified(utm, _LINE_M)
-    length_m = float(np.linalg.norm(np.diff(enu_m, axis=0), axis=1).sum())
-    line = np.array([_wkb_line(utm[kept])], dtype=object)
-    _write(path, "way", line, site, {"length_m": np.array([length_m])}, kind="LineString Z", append=False)
-    points = np.array([_wkb_point(point) for point in utm], dtype=object)
-    times = stamps_ns.astype("datetime64[ns]").astype("datetime64[ms]")
-    _write(path, "poses", points, site, {"time": times, **columns}, kind="Point Z", append=True)
+    way = survey.positions_m
+    points = way if survey.site is None else survey.site.utm(way)
+    length_m = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    line = shapely.linestrings(points[simplified(points, _LINE_M)])
+    facts = {name: text([value]) if isinstance(value, str) else np.array([value]) for name, value in told.items()}
+    named = {"run_id": text([survey.session]), "event_start": text([survey.start]), "event_end": text([survey.end])}
+    metric = _metric(survey.site)
+    _write(path, _Layer("track", "LineString Z", metric), [line], {**named, "length_m": np.array([length_m]), **facts})
+    times = survey.stamps_ns.astype("datetime64[ns]").astype("datetime64[ms]")
+    _write(path, _Layer("poses", "Point Z", metric), shapely.points(points), {"time": times, **columns})
 
 
-def _write(
-    path: Path,
-    layer: str,
-    geometry: npt.NDArray[np.object_],
-    site: Site,
-    columns: dict[str, npt.NDArray[np.generic]],
-    *,
-    kind: str,
-    append: bool,
-) -> None:
+def add_findings(path: Path, handout: Handout) -> None:
+    """Add `detections` with every column of the table, `patches`, and `searched_area`.
+
+    Detections are in EPSG:4326, as databases want them, everything else as the way is.
+    """
+    site, positions = handout.survey.site, handout.findings.positions_m
+    places = positions if site is None else site.geodetic(positions)
+    detections = _Layer("detections", "Point", _LOCAL if site is None else "EPSG:4326", UNVERIFIED)
+    _write(path, detections, shapely.points(places[:, :2]), handout.rows)
+    shapes = [_placed(patch.outline, site) for patch in handout.patches]
+    _write(path, _Layer("patches", "Polygon", _metric(site), UNVERIFIED), shapes, _patch_columns(handout))
+    searched = [_placed(handout.searched, site)]
+    _write(path, _Layer("searched_area", "MultiPolygon", _metric(site)), searched, _searched_columns(handout))
+
+
+def add_styles(path: Path) -> None:
+    """Last: how QGIS draws the layers, in the table that it looks for when it opens one."""
+    layers = [name for name, _ in pyogrio.list_layers(path).tolist()]
+    columns = {
+        "f_table_catalog": text([""] * len(layers)),
+        "f_table_schema": text([""] * len(layers)),
+        "f_table_name": text(layers),
+        "f_geometry_column": text(["geom"] * len(layers)),
+        "styleName": text(layers),
+        "styleQML": text([layer_style(layer) for layer in layers]),
+        "styleSLD": text([""] * len(layers)),
+        "useAsDefault": np.ones(len(layers), bool),
+        "description": text(["mapforest"] * len(layers)),
+        "owner": text([""] * len(layers)),
+        "update_time": np.full(len(layers), np.datetime64("now", "ms")),  # QGIS orders by it
+    }
+    _write(path, _Layer("layer_styles"), None, columns)
+
+
+def _patch_columns(handout: Handout) -> Columns:
+    grown, rows, survey = handout.patches, handout.rows, handout.survey
+    members = [rows["source_id"][list(patch.members)].tolist() for patch in grown]
+    return {
+        "uuid": text([str(uuid.uuid5(_NAMESPACE, " ".join(names))) for names in members]),
+        "infested_area_m2": np.array([patch.infested_m2 for patch in grown], np.float64).round(1),
+        "gross_area_m2": np.array([patch.gross_m2 for patch in grown], np.float64).round(1),
+        "percent_cover": np.array([patch.percent_cover for patch in grown], np.float64).round(1),
+        "n_trees": np.array([len(patch.members) for patch in grown], np.int32),
+        "trees": text([", ".join(str(rows["tree_id"][k]) for k in patch.members) for patch in grown]),
+        "event_date": text([survey.start] * len(grown)),
+        "observer": text([survey.observer] * len(grown)),
+        "verification_status": text(["unverified"] * len(grown)),
+    }
+
+
+def _searched_columns(handout: Handout) -> Columns:
+    findings, survey = handout.findings, handout.survey
+    return {
+        "uuid": text([str(uuid.uuid5(_NAMESPACE, f"{survey.session}/searched"))]),
+        "area_m2": np.array([handout.searched.area]).round(1),
+        "n_detections": np.array([len(findings.trees)], np.int32),
+        "n_images": np.array([findings.images], np.int32),
+        "survey_method": text([f"camera on the move, detector {findings.model.name}; unhidden map points within view"]),
+        "event_start": text([survey.start]),
+        "event_end": text([survey.end]),
+        "observer": text([survey.observer]),
+    }
+
+
+def _placed(shape: Any, site: Site | None) -> Any:
+    return shape if site is None else on_the_grid(shape, site)
+
+
+def _metric(site: Site | None) -> str:
+    return _LOCAL if site is None else f"EPSG:{site.epsg}"
+
+
+def _write(path: Path, layer: _Layer, shapes: Any, columns: Columns) -> None:
     pyogrio.raw.write(
         path,
-        geometry,
+        None if shapes is None else np.asarray(shapely.to_wkb(np.asarray(shapes, object)), object),
         list(columns.values()),
         list(columns),
-        layer=layer,
+        layer=layer.name,
         driver="GPKG",
-        geometry_type=kind,
-        crs=f"EPSG:{site.epsg}",
-        append=append,
+        geometry_type=layer.kind,
+        crs=layer.crs,
+        append=path.exists(),
+        dataset_options={} if path.exists() else {"VERSION": _VERSION},
+        layer_options={"DESCRIPTION": layer.about},
     )
-
-
-def write_kml(path: Path, site: Site, name: str, stamps_ns: npt.NDArray[np.int64], enu_m: Array) -> None:
-    """One line on the ground, with the time span of the session."""
-    kept = simplified(enu_m, _LINE_M)
-    coordinates = " ".join(f"{lon:.8f},{lat:.8f},{h:.2f}" for lon, lat, h in site.geodetic(enu_m[kept]).tolist())
-    begin, end = (_utc(int(stamps_ns[k])) for k in (0, -1))
-    path.write_text(
-        '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>\n'
-        f"<name>{escape(name)}</name>\n"
-        '<Style id="way"><LineStyle><color>ff0080ff</color><width>3</width></LineStyle></Style>\n'
-        f"<Placemark><name>{escape(name)}</name><styleUrl>#way</styleUrl>"
-        f"<TimeSpan><begin>{begin}</begin><end>{end}</end></TimeSpan>\n"
-        f"<LineString><tessellate>1</tessellate><coordinates>{coordinates}</coordinates></LineString></Placemark>\n"
-        "</Document></kml>\n",
-        encoding="utf-8",
-    )
-
-
-def _utc(stamp_ns: int) -> str:
-    return f"{datetime.fromtimestamp(stamp_ns // 1_000_000_000, timezone.utc):%Y-%m-%dT%H:%M:%SZ}"
-
-
-def _wkb_point(point: Array) -> bytes:
-    return struct.pack("<BI3d", 1, _WKB_POINT_Z, *point)
-
-
-def _wkb_line(points: Array) -> bytes:
-    return struct.pack("<BII", 1, _WKB_LINE_Z, len(points)) + np.ascontiguousarray(points, "<f8").tobytes()

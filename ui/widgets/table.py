@@ -11,7 +11,7 @@ from ui.history import History
 from ui.pieces import Pieces, plain
 from ui.sensors import columns, header, rows
 from ui.situation import Situation
-from ui.vitals import detecting_line, gnss_line, location_line
+from ui.vitals import detecting_line, gnss_line, location_line, mapped_line
 from ui.widgets.line import Line
 
 ROWS = 24
@@ -58,6 +58,8 @@ class SensorTable(VerticalScroll, can_focus=False):
             lines.append(location_line(status.location))
         if status is not None and status.detecting is not None:
             lines.append(detecting_line(status.detecting))
+        if status is not None and status.mapped is not None:
+            lines.append(mapped_line(status.mapped))
         lines.append(header(widths))
         for sensor in status.sensors if status else ():
             if self.app.size.height >= TALL:

@@ -19,7 +19,7 @@ from edge.dataset.frames import FramesTask, extract
 from edge.dataset.image import digest, image_facts
 from edge.dataset.way import Way, find_way, strides_m
 from edge.errors import FormatError
-from edge.process.products_stage import ProductFacts
+from edge.process.product_facts import ProductFacts
 from pipeline.gnss.geodesy import geodetic
 from pipeline.products.tum import write_tum
 from tests.edge.dataset import scenes

@@ -12,10 +12,10 @@ from edge.cli.main import main
 from edge.cli.trajectories import agreement
 from edge.errors import FormatError
 from edge.process.against_truth import APART, find_pairs
-from edge.process.products_stage import ProductFacts
+from edge.process.product_facts import ProductFacts
 from pipeline.evaluation.pair import compare
 from pipeline.gnss.geodesy import Datum
-from pipeline.products.covariance import read_covariance, write_covariance
+from pipeline.products.covariance import pose_table, read_covariance, write_covariance
 from pipeline.products.track import ESTIMATE
 from pipeline.products.tum import write_tum
 from tests.edge import live_recordings
@@ -56,8 +56,9 @@ def session(tmp_path):
     track["stamp_ns"] = stamps
     covariance = np.tile(np.diag([0.04, 0.04, 0.09, 0, 0, 0]), (COUNT, 1, 1))
     covariance[:, 0, 1] = covariance[:, 1, 0] = -0.01
-    write_covariance(products / "covariance.csv", "map", track, here, covariance)
-    np.testing.assert_allclose(read_covariance(products / "covariance.csv")[1], covariance[:, :3, :3], rtol=1e-5)
+    write_covariance(products / "covariance.csv", pose_table("map", track, here, covariance))
+    back = read_covariance(products / "covariance.csv")
+    np.testing.assert_allclose(back.covariance[:, :3, :3], covariance[:, :3, :3], rtol=1e-5)
     datum = (HERE.latitude_deg, HERE.longitude_deg, HERE.height_m)
     facts = ProductFacts("walk", "map", "EPSG:32618", datum=datum, host_offset_ns=OFFSET_NS)
     (products / "products.json").write_bytes(msgspec.json.encode(facts))

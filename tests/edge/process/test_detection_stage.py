@@ -80,13 +80,13 @@ def test_detections_are_kept_by_stamp_with_the_model_that_made_them(recording, m
 
 def test_it_is_done_once_and_again_only_when_it_would_be_different(recording, model):
     config = with_model(model)
-    all_stages = ("odometry", "fusion", "detection", "products")
+    all_stages = ("odometry", "fusion", "detection", "grounding", "products")
     assert process(Task([recording]), config, load=fakes()).redone == all_stages
     assert process(Task([recording]), config, load=None).redone == ()
     finer = with_model(model, rate_hz=10.0)
-    assert process(Task([recording]), finer, load=None).redone == ("detection", "products")
+    assert process(Task([recording]), finer, load=None).redone == ("detection", "grounding", "products")
     other = models.spotter(model.parent / "other.onnx", (96, 160), names=("red",))
-    assert process(Task([recording]), with_model(other), load=None).redone == ("detection", "products")
+    assert process(Task([recording]), with_model(other), load=None).redone == ("detection", "grounding", "products")
     plain = process(Task([recording]), Config(), load=None)
     assert plain.redone == ("products",)
     assert plain.facts.detection is None
@@ -134,6 +134,6 @@ def test_the_command_takes_a_model(recording, model, capsys, monkeypatch):
     assert main(["process", str(recording), "--detect", str(model), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["detection"]["model"]["name"] == "spot"
-    assert told["redone"] == ["odometry", "fusion", "detection", "products"]
+    assert told["redone"] == ["odometry", "fusion", "detection", "grounding", "products"]
     assert main(["process", str(recording), "--detect", str(model) + "x"]) == 1
     assert "cannot be read" in capsys.readouterr().err

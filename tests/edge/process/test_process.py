@@ -19,8 +19,6 @@ from edge.process.process import Task, process
 from edge.process.sweep_odometry import Tracked
 from pipeline.estimates import GlobalPose, OdometryEstimate
 from pipeline.gnss.geodesy import Datum
-from tests.edge.replay import foreign
-from tests.edge.replay.foreign import START_NS, SWEEP_NS
 
 DATUM = Datum(47.0, 8.0, 500.0)
 
@@ -66,14 +64,6 @@ class Turned:
 
 def fakes(*, smooth=lambda _odometry, _fixes, _config: Turned(), odometry=StraightOn):
     return lambda: Estimators(odometry, smooth, None)
-
-
-@pytest.fixture
-def recording(tmp_path):
-    bag = foreign.walk(foreign.custom, sweeps=8)
-    for k in range(8):
-        bag.add("/fix", START_NS + k * SWEEP_NS, foreign.fix(START_NS + k * SWEEP_NS))
-    return bag.write(tmp_path / "walk.mcap")
 
 
 def test_everything_is_made_and_georeferenced(recording):

@@ -179,3 +179,11 @@ def walk(
             bag.add(imu_topic, at + 1_000_000, imu(at, acceleration))
         bag.add(lidar, stamp_ns + SWEEP_NS, make_scan(stamp_ns))
     return bag
+
+
+def walk_with_fixes(path: Path, sweeps: int = 8) -> Path:
+    """A walk whose sweeps have a fix each."""
+    bag = walk(custom, sweeps=sweeps)
+    for k in range(sweeps):
+        bag.add("/fix", START_NS + k * SWEEP_NS, fix(START_NS + k * SWEEP_NS))
+    return bag.write(path)

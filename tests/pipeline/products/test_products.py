@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import struct
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import laspy
 import numpy as np
-import pyogrio
 import pyproj
 import pytest
 
 from pipeline.estimates import OdometryEstimate
 from pipeline.gnss.geodesy import Datum
 from pipeline.products.earth import Site
+from pipeline.products.findings import PointEvidence
 from pipeline.products.laz import MapSource, adjusted_gps_s, write_laz
 from pipeline.products.plots import Line, Plot, thinned, ticks
 from pipeline.products.simplify import simplified
 from pipeline.products.tiles import TileStore, read_tile, tiles
 from pipeline.products.track import Placement, TrackWriter, estimate_of, read_track
 from pipeline.products.tum import write_tum
-from pipeline.products.vector import write_geopackage, write_kml
 
 DATUM = (40.057, -75.218, 60.0)
 SITE = Site(DATUM)
@@ -83,32 +84,6 @@ def walk(count: int = 50) -> tuple[np.ndarray, np.ndarray]:
     angles = np.linspace(0, np.pi, count)
     stamps = START_NS + np.arange(count) * 10**8
     return stamps, np.column_stack([20 * np.cos(angles), 20 * np.sin(angles), np.linspace(0, 2, count)])
-
-
-def test_the_geopackage_holds_the_way_and_its_poses(tmp_path):
-    stamps, enu = walk()
-    write_geopackage(tmp_path / "a.gpkg", SITE, stamps, enu, {"sigma_m": np.full(len(enu), 0.5)})
-    assert pyogrio.list_layers(tmp_path / "a.gpkg")[:, 0].tolist() == ["way", "poses"]
-    meta, _, geometry, fields = pyogrio.raw.read(tmp_path / "a.gpkg", layer="poses")
-    assert (meta["crs"], len(geometry)) == ("EPSG:32618", len(enu))
-    first = np.frombuffer(geometry[0], "<f8", 3, offset=5)
-    np.testing.assert_allclose(first, SITE.utm(enu[:1])[0], atol=1e-6)
-    assert abs(fields[0][1].astype("datetime64[ms]").astype(int) - stamps[1] // 10**6) <= 1
-    meta, _, geometry, fields = pyogrio.raw.read(tmp_path / "a.gpkg", layer="way")
-    assert fields[0][0] == pytest.approx(np.linalg.norm(np.diff(enu, axis=0), axis=1).sum())
-    assert len(geometry[0]) < 9 + 24 * len(enu)
-
-
-def test_the_kml_is_a_line_at_the_place(tmp_path):
-    stamps, enu = walk()
-    write_kml(tmp_path / "a.kml", SITE, "walk <1> & back", stamps, enu)
-    root = ElementTree.parse(tmp_path / "a.kml").getroot()
-    space = {"k": "http://www.opengis.net/kml/2.2"}
-    assert root.findtext(".//k:Placemark/k:name", namespaces=space) == "walk <1> & back"
-    coordinates = root.findtext(".//k:coordinates", namespaces=space)
-    assert coordinates is not None
-    longitude, latitude, _ = map(float, coordinates.split()[0].split(","))
-    assert (longitude, latitude) == pytest.approx(tuple(SITE.geodetic(enu[:1])[0][:2]), abs=1e-7)
 
 
 def test_a_simpler_line_is_never_farther_off_than_allowed():
@@ -182,6 +157,31 @@ def test_the_map_is_laz_with_crs_time_intensity_and_sigma(tmp_path):
 def test_gps_time_of_a_known_instant():
     # 2020-01-01T00:00:00Z is GPS second 1261872018.
     assert adjusted_gps_s(np.array([1_577_836_800_000_000_000]))[0] == 1_261_872_018 - 1_000_000_000
+
+
+def test_what_the_camera_made_of_each_point_is_in_the_map(tmp_path):
+    asked = []
+
+    def evidence(tile, points):
+        asked.append((tile, len(points)))
+        seen = (points["sweep"] != 1).astype(np.uint16) * 7
+        heat = np.where(seen > 0, points["xyz"][:, 0] > 2, np.nan).astype(np.float32)
+        return PointEvidence(heat, (heat > 0.5).astype(np.uint8), seen)
+
+    plain = source(tmp_path / "tiles", None)
+    count = write_laz(tmp_path / "map.laz", replace(plain, evidence=evidence), lambda _: None)
+    read = laspy.read(tmp_path / "map.laz")
+    assert sum(points for _, points in asked) == count
+    assert [tile for tile, _ in asked] == tiles(tmp_path / "tiles")
+    np.testing.assert_array_equal(np.array(read.heat), np.where(read.sweep == 1, -1.0, read.x > 2))
+    np.testing.assert_array_equal(np.array(read.label), (read.sweep != 1) & (read.x > 2))
+    np.testing.assert_array_equal(np.array(read.seen), np.where(read.sweep == 1, 0, 7))
+    # LAS 1.4 R15, table 24: options a byte before the name, the value for "none" 36 bytes after its begin.
+    raw = (tmp_path / "map.laz").read_bytes()
+    at = raw.index(b"heat\0")
+    assert (raw[at - 1], struct.unpack_from("<d", raw, at + 36)) == (0b1, (-1.0,))
+    write_laz(tmp_path / "plain.laz", plain, lambda _: None)
+    assert "heat" not in laspy.read(tmp_path / "plain.laz").point_format.extra_dimension_names
 
 
 def test_a_local_map_has_no_crs_and_says_why(tmp_path):

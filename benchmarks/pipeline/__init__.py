@@ -1,0 +1,1 @@
+"""The whole onboard pipeline over simulated walks with everything the payload records."""

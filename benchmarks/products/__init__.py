@@ -1,0 +1,1 @@
+"""Products in the hands of programs that are not ours."""

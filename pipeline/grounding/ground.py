@@ -1,0 +1,58 @@
+"""The ground around a place, as far as needed to tell a stem's base from its crown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+Array = npt.NDArray[np.float64]
+CELL_M = 1.0
+RANK = 2
+"""The third lowest point of a cell: two may be stray."""
+WINDOW = 5
+STEEPEST_M = 0.9
+"""A cell that stands higher than this above the lowest of its neighbourhood, opened, saw no ground."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """height_m: (nx, ny) at the middles of cells of `CELL_M` from `origin_m` (x, y)."""
+
+    origin_m: Array
+    height_m: Array
+
+    @classmethod
+    def under(cls, points_m: Array) -> Ground:
+        """Of points (n, 3), n > 0."""
+        origin = np.floor(points_m[:, :2].min(axis=0) / CELL_M) * CELL_M
+        index = ((points_m[:, :2] - origin) / CELL_M).astype(np.int64)
+        shape = index.max(axis=0) + 1
+        cells = index[:, 0] * shape[1] + index[:, 1]
+        order = np.lexsort((points_m[:, 2], cells))
+        found, first, count = np.unique(cells[order], return_index=True, return_counts=True)
+        lowest = points_m[order[first + np.minimum(RANK, count - 1)], 2]
+        height = np.full(int(shape[0] * shape[1]), np.nan)
+        height[found] = lowest
+        return cls(origin, _opened(height.reshape(shape)))
+
+    def at(self, xy_m: Array) -> Array:
+        """(n,) height of the ground under (n, 2); beyond the grid, that of its rim."""
+        where = (xy_m - self.origin_m) / CELL_M - 0.5
+        return np.asarray(ndimage.map_coordinates(self.height_m, where.T, order=1, mode="nearest"))
+
+
+def _opened(height: Array) -> Array:
+    """Without what no ground was seen under, which takes the height of the nearest cell that has it."""
+    filled = _filled(height, np.isnan(height))
+    low = ndimage.grey_opening(filled, size=(WINDOW, WINDOW))
+    return _filled(filled, np.isnan(height) | (filled > low + STEEPEST_M))
+
+
+def _filled(height: Array, missing: npt.NDArray[np.bool_]) -> Array:
+    if missing.all() or not missing.any():
+        return np.nan_to_num(height)
+    nearest = ndimage.distance_transform_edt(missing, return_distances=False, return_indices=True)
+    return np.asarray(height[tuple(nearest)])
