@@ -72,7 +72,7 @@ def gnss_line(gnss: Gnss | None) -> Pieces:
 
 
 def location_line(location: Location) -> Pieces:
-    """What the live pipeline says: state in a badge, then way, speed, sigma, and what it had to leave out."""
+    """What the live pipeline says: state in a badge, way, speed, sigma, what it had to leave out and what is wrong."""
     bad = location.state == "lost"
     tone = Tone.BAD if bad else Tone.GOOD if location.state == "tracking" else Tone.WARN
     label = ("POSE    ", "$quiet-text")
@@ -90,6 +90,8 @@ def location_line(location: Location) -> Pieces:
     if location.dropped or location.thinned < 1.0:
         behind = f"  {Tone.WARN.symbol} {location.thinned:.0%} of the points, {location.dropped} sweeps left out"
         pieces = (*pieces, (behind, Tone.WARN.text))
+    if location.note:
+        pieces = (*pieces, (f"  {location.note}", tone.text if tone in (Tone.WARN, Tone.BAD) else "$quiet-text"))
     return pieces
 
 

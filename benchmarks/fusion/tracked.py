@@ -30,7 +30,9 @@ def tracked(world: World, cache: Path) -> Odometry:
     stamps = stamps[inside]
     position, rotation = found["position"][inside], found["rotation"][inside]
     covariance = found["covariance"][inside][:, POSITION_FIRST][:, :, POSITION_FIRST]
-    weak = np.isin(found["status"][inside], [Status.DEGENERATE.value, Status.COASTING.value])
+    weak = np.isin(
+        found["status"][inside], [one.value for one in (Status.DEGENERATE, Status.DOUBTFUL, Status.COASTING)]
+    )
     way = _travelled(position)
     estimates = [
         OdometryEstimate(

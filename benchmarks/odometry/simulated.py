@@ -18,6 +18,7 @@ from drivers.messages import ImuSample, LidarScan
 from drivers.sim.imu import GRAVITY_M_S2
 from drivers.sim.lidar import LEVER_M
 from drivers.sim.scenarios import WorldConfig
+from drivers.sim.trajectory import SPLINE_NS, Trajectory
 from drivers.sim.world import World, build
 
 EPOCH_NS = 1_000_000_000_000
@@ -74,15 +75,26 @@ class Walk:
 POINT = np.dtype([("xyz_mm", "<i4", 3), ("slot", "<u2"), ("reflectivity", "u1"), ("tag", "u1")])
 
 
-def walk(config: WorldConfig, cache: Path, longest_s: float = 1e9) -> Walk:
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Of the payload about the vertical, on top of what the carrier does; smooth at both ends."""
+
+    begin_s: float
+    took_s: float
+    degrees: float
+
+
+def walk(config: WorldConfig, cache: Path, longest_s: float = 1e9, turns: tuple[Turn, ...] = ()) -> Walk:
     """The walk of a configuration, cast now or taken from `cache`."""
     folder = cache / f"{config.name}_{config.seed}_{config.length_m:.0f}m"
-    about = json.dumps(asdict(config) | {"longest_s": longest_s}, sort_keys=True)
+    told = {"longest_s": longest_s} | ({"turns": [asdict(turn) for turn in turns]} if turns else {})
+    about = json.dumps(asdict(config) | told, sort_keys=True)
     if (folder / "about.json").exists() and (folder / "about.json").read_text() == about:
         return Walk(folder)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     world = build(config)
+    world.trajectory = _turned(world.trajectory, turns)
     end_ns = min(world.trajectory.duration_ns, int(longest_s * 1e9))
     _cast(world, folder, end_ns // SCAN_NS)
     _sense(world, folder, end_ns)
@@ -93,6 +105,18 @@ def walk(config: WorldConfig, cache: Path, longest_s: float = 1e9) -> Walk:
 def shortened(config: WorldConfig, length_m: float | None) -> WorldConfig:
     """The same world with a shorter way, for quick looks."""
     return config if length_m is None else replace(config, length_m=length_m)
+
+
+def _turned(trajectory: Trajectory, turns: tuple[Turn, ...]) -> Trajectory:
+    """The same way with other headings."""
+    if not turns:
+        return trajectory
+    times = np.arange(0, trajectory.duration_ns + 1, SPLINE_NS)
+    control = trajectory.spline(times)[:, 0].copy()
+    for turn in turns:
+        share = np.clip((times * 1e-9 - turn.begin_s) / turn.took_s, 0.0, 1.0)
+        control[:, 5] += np.radians(turn.degrees) * (share - np.sin(2.0 * np.pi * share) / (2.0 * np.pi))
+    return Trajectory(control)
 
 
 def _cast(world: World, folder: Path, count: int) -> None:

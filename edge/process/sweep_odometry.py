@@ -19,7 +19,6 @@ from pipeline.odometry.odometry import LidarInertialOdometry
 _POSITION_FIRST = [3, 4, 5, 0, 1, 2]
 _STRIDE_M = 0.05
 """Travelled way is counted in strides of at least this: standing still adds nothing."""
-_WORDS = {Status.COASTING: "the sweep does not fit the map: carried by the IMU alone"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +40,7 @@ class SweepOdometry:
 
     @property
     def note(self) -> str:
-        """Why there is no estimate, empty when there is."""
+        """Why the last sweep brought no estimate, empty when it did."""
         return self._odometry.refusal
 
     def process(self, sweep: Sweep) -> Iterator[Tracked]:
@@ -82,16 +81,9 @@ class SweepOdometry:
             gyro_bias=found.gyro_bias,
             accel_bias=found.accel_bias,
             travelled_m=self._travelled_m,
-            degenerate=found.status in (Status.DEGENERATE, Status.COASTING),
+            degenerate=found.status in (Status.DEGENERATE, Status.DOUBTFUL, Status.COASTING),
             weak_directions=found.weak_position,
             points=found.residuals.clusters,
             matches=found.residuals.matches,
-            note=_note(found),
+            note=found.note,
         )
-
-
-def _note(found: Odometry) -> str:
-    words = [found.note, _WORDS.get(found.status, "")]
-    words.append("the IMU reached its range" if found.saturated else "")
-    words.append("no inertial samples for a while" if found.gap_s else "")
-    return "; ".join(word for word in words if word)

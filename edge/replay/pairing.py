@@ -1,7 +1,7 @@
 """Each sweep with the inertial samples up to its end, from messages that come as they come.
 
 Scans arrive before the samples that cover them, samples arrive late or twice, and either may stop for a while. Nothing
-goes back in time; what comes too late is left out and counted.
+goes back in time; what comes too late is left out and counted, and so are single stamps far from the others.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from drivers.messages import ImuSample, LidarScan
+from pipeline.odometry.time_gate import TimeGate
 
 PATIENCE_NS = 400_000_000
 """A scan waits so long, in the time of the stamps, for inertial data that do not come."""
@@ -30,7 +31,7 @@ class Sweep:
 
 @dataclass(slots=True)
 class Left:
-    """What was left out because it came too late, or twice."""
+    """What was left out because it came too late, or twice, or was stamped elsewhere in time."""
 
     scans: int = 0
     samples: int = 0
@@ -41,6 +42,7 @@ class Pairing:
 
     def __init__(self) -> None:
         self.left = Left()
+        self._sample_gate, self._scan_gate = TimeGate[ImuSample](), TimeGate[LidarScan]()
         self._samples: list[ImuSample] = []
         self._scans: list[LidarScan] = []
         self._given_ns = -(1 << 62)
@@ -57,9 +59,13 @@ class Pairing:
     def add(self, message: LidarScan | ImuSample) -> Iterator[Sweep]:
         """Take a message; the sweeps that it completes."""
         if isinstance(message, ImuSample):
-            self._add_sample(message)
+            for sample in self._sample_gate.admit(message, self._scan_gate.newest_ns):
+                self._add_sample(sample)
+            self.left.samples += self._sample_gate.newly_refused()
         else:
-            self._add_scan(message)
+            for scan in self._scan_gate.admit(message, self._sample_gate.newest_ns):
+                self._add_scan(scan)
+            self.left.scans += self._scan_gate.newly_refused()
         yield from self._ready()
 
     def flush(self) -> Iterator[Sweep]:

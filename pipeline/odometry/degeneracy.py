@@ -40,14 +40,18 @@ def observe(information: Doubles, config: DegeneracyConfig) -> Observability:
 
 
 def damp(information: Doubles, gradient: Doubles, seen: Observability, share: float) -> tuple[Doubles, Doubles]:
-    """Information and gradient with only `share` left along the weak directions."""
+    """Information and gradient with only `share` left along the weak directions.
+
+    They are marginalised out: crossed out, what they share with the other directions would pull at those.
+    """
     if not seen.degenerate:
         return information, gradient
-    keep = np.eye(6)
-    scale = 1.0 - np.sqrt(share)
-    keep[:3, :3] -= scale * seen.weak_attitude.T @ seen.weak_attitude
-    keep[3:, 3:] -= scale * seen.weak_position.T @ seen.weak_position
-    return keep @ information @ keep, keep @ (keep @ gradient)
+    weak = np.zeros((6, len(seen.weak_attitude) + len(seen.weak_position)))
+    weak[:3, : len(seen.weak_attitude)] = seen.weak_attitude.T
+    weak[3:, len(seen.weak_attitude) :] = seen.weak_position.T
+    reached = information @ weak
+    taken = (1.0 - share) * np.linalg.solve(weak.T @ reached + 1e-9 * np.eye(weak.shape[1]), weak.T)
+    return information - reached @ taken @ information, gradient - reached @ (taken @ gradient)
 
 
 def _directions(information: Doubles, own: slice, other: slice) -> tuple[Doubles, Doubles]:

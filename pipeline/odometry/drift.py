@@ -14,6 +14,8 @@ from pipeline.odometry import so3
 from pipeline.odometry.config import DriftConfig
 from pipeline.odometry.so3 import Doubles
 
+NONE = np.empty((0, 3))
+
 
 class Drift:
     """Covariance (4, 4) of yaw (rad) and position (m) of the map at the sensor, in `odom`."""
@@ -21,9 +23,14 @@ class Drift:
     def __init__(self, config: DriftConfig) -> None:
         self._config = config
         self._covariance: Doubles = np.zeros((4, 4))
+        self._unseen_m = 0.0
 
-    def move(self, step_m: Doubles, factor: float = 1.0) -> None:
-        """The sensor moved by (3,) in `odom`; factor widens the walk where the scan was degenerate."""
+    def move(self, step_m: Doubles, factor: float = 1.0, weak: Doubles = NONE) -> None:
+        """The sensor moved by (3,) in `odom`. factor: widens the walk where the scan was no good.
+
+        weak: rows (k, 3), directions that the scan did not show, as long (0 to 1) as it was followed there all the
+        same: the error grows with the way itself.
+        """
         length = float(np.linalg.norm(step_m))
         transition = np.eye(4)
         transition[1, 0], transition[2, 0] = -step_m[1], step_m[0]
@@ -35,6 +42,9 @@ class Drift:
         grown[1, 1] += share * config.horizontal**2
         grown[2, 2] += share * config.horizontal**2
         grown[3, 3] += share * config.vertical**2
+        before_m, self._unseen_m = self._unseen_m, self._unseen_m + length if len(weak) else 0.0
+        if len(weak):
+            grown[1:, 1:] += config.weak**2 * (self._unseen_m**2 - before_m**2) * weak.T @ weak
         self._covariance = grown
 
     def widen(self, position_m: float, yaw_rad: float) -> None:

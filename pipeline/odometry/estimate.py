@@ -17,6 +17,8 @@ class Status(Enum):
     TRACKING = "tracking"
     DEGENERATE = "degenerate"
     """The scan left a direction open; the inertial sensor carries it."""
+    DOUBTFUL = "doubtful"
+    """Scan and inertial samples contradict each other; the samples were doubted, and the scan was followed."""
     COASTING = "coasting"
     """No scan, or none that fits the map: inertial only."""
     RESTARTED = "restarted"
@@ -25,7 +27,10 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residuals:
-    """Of the last iteration. clusters: of the scan; matches: those that met a voxel; squared: mean d^2 of these."""
+    """Of the last iteration. clusters: of the scan; matches: those that met a voxel; squared: mean d^2 of these.
+
+    surprise: normalised square of what the scan moved the inertial prediction by, six degrees of freedom.
+    """
 
     points: int
     clusters: int
@@ -33,6 +38,7 @@ class Residuals:
     squared: float
     kept: float
     iterations: int
+    surprise: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

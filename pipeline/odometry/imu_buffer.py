@@ -64,19 +64,20 @@ class ImuBuffer:
         return self.newest_ns >= end_ns - int(longest_s * 1e9) and self.gap_s(begin_ns, end_ns) <= longest_s
 
     def gap_s(self, begin_ns: int, end_ns: int) -> float:
-        """Longest silence (s) that reaches into a stretch, from the sample before it on."""
-        first = max(bisect.bisect_right(self._stamps, begin_ns) - 1, 0)
-        last = min(bisect.bisect_left(self._stamps, end_ns) + 1, len(self._stamps))
-        stamps = [*self._stamps[first:last]]
-        if not stamps:
-            return (end_ns - begin_ns) * 1e-9
-        stamps = [min(begin_ns, stamps[0]), *stamps, max(end_ns, stamps[-1])]
-        return float(np.diff(stamps).max()) * 1e-9
+        """Longest silence (s) within a stretch."""
+        first, last = bisect.bisect_left(self._stamps, begin_ns), bisect.bisect_right(self._stamps, end_ns)
+        return float(np.diff([begin_ns, *self._stamps[first:last], end_ns]).max()) * 1e-9
 
     def taken(self, end_ns: int) -> None:
         """All before `end_ns` has been used; only the last of it is kept, to interpolate from."""
         self._taken_ns = max(self._taken_ns, end_ns - 1)
         self._forget(end_ns)
+
+    def clear(self) -> None:
+        """All is as at the beginning, but for the count of what was late."""
+        self._stamps.clear()
+        self._rows.clear()
+        self._taken_ns = -1
 
     def _forget(self, before_ns: int) -> None:
         drop = bisect.bisect_right(self._stamps, before_ns) - 1

@@ -10,12 +10,12 @@ from drivers.messages import LidarScan
 from pipeline.odometry.config import OdometryConfig
 from pipeline.odometry.deskew_kernels import deskew
 from pipeline.odometry.drift import level
-from pipeline.odometry.errors import StartRefused
+from pipeline.odometry.errors import TRIED, StartRefused
 from pipeline.odometry.filter import Filter
 from pipeline.odometry.rough_velocity import rough_velocity
 from pipeline.odometry.so3 import Doubles
 from pipeline.odometry.state import ERRORS, GRAVITY_M_S2, VELOCITY, State
-from pipeline.odometry.tracker import Tracker
+from pipeline.odometry.tracker import Registration, Tracker, usable
 
 FORCE_SHARE = (0.8, 1.2)
 """Mean specific force at start-up, as a share of gravity; beyond it the unit is wrong, or the payload falls."""
@@ -34,7 +34,7 @@ def force_scale(imu: Doubles) -> float:
             return scale
     raise StartRefused(
         f"the accelerometer shows {size:.2f} on average, neither about 9.8 (m/s^2) nor 1 (g): "
-        "check its unit and scale, or hold the payload still for a moment"
+        "check its unit and scale; hold the payload still if it falls or swings"
     )
 
 
@@ -65,14 +65,14 @@ def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: Odom
     state = _upright(force, gyro_bias=np.zeros(3))
     clouds, times_s = _clouds(scans, windows, state, config)
     state = replace(state, velocity_m_s=rough_velocity(clouds, times_s))
-    moved, matched, tracker = 0.0, 1.0, None
+    moved, matched, tracker, found = 0.0, 1.0, None, None
     for _ in range(config.start.passes):
         tracker = Tracker(config, Filter(state, _covariance(MOVING), config.imu, config.match))
         pushed, shares = np.zeros(3), []
         for scan, window in zip(scans, windows, strict=True):
             before = tracker.filter.state
-            found = tracker.track(scan, window).residuals
-            shares.append(found.matches / max(found.clusters, 1))
+            found = tracker.track(scan, window)
+            shares.append(found.residuals.matches / max(found.residuals.clusters, 1))
             pushed += _pushed(before, window, config)
         end = tracker.filter.state
         took_s = sum(float(window[-1, 0] - window[0, 0]) for window in windows)
@@ -89,7 +89,8 @@ def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: Odom
         moved, matched = float(np.linalg.norm(again.velocity_m_s - state.velocity_m_s)), float(np.mean(shares[1:]))
         state = again
     assert tracker is not None
-    _accept(tracker, moved, matched, config)
+    assert found is not None
+    _accept(tracker, found, moved, matched, config)
     sigmas = MOVING | {"velocity": 0.3, "gravity": 0.03, "gyro": 3e-3}
     return Filter(state, _covariance(sigmas), config.imu, config.match)
 
@@ -105,7 +106,7 @@ def _clouds(
         weightless[:, 4:7] = 0.0
         knots = probe.propagate(weightless)
         knots[:, 10:19] = 0.0
-        keep = np.linalg.norm(scan.xyz_m, axis=1) > config.nearest_m
+        keep = usable(scan, config)
         turn, lever = np.array(config.lidar_to_base), np.array(config.lidar_in_base_m)
         points = deskew(scan.xyz_m[keep], scan.offset_ns[keep] * 1e-9, knots, turn, lever)
         state = replace(state, rotation=probe.state.rotation)
@@ -113,17 +114,21 @@ def _clouds(
     return clouds, np.array([scan.stamp_ns - scans[0].stamp_ns for scan in scans]) * 1e-9
 
 
-def _accept(tracker: Tracker, moved: float, matched: float, config: OdometryConfig) -> None:
+def _accept(tracker: Tracker, last: Registration, moved: float, matched: float, config: OdometryConfig) -> None:
     sigma = float(np.sqrt(np.diag(tracker.filter.covariance)[VELOCITY].max()))
     limit = config.start.velocity_sigma_m_s
     if matched < config.match.least_share:
         raise StartRefused(
-            f"only {matched:.0%} of a scan meets the scans before it: nothing solid in view, or moving too fast"
+            f"only {matched:.0%} of a scan meets the scans before it: nothing solid in view, or moving too fast",
+            TRIED,
         )
+    if len(last.weak_position) > 1:
+        raise StartRefused("the scans do not show which way they went: hold still, or move among trees", TRIED)
     if sigma > limit or moved > limit:
         raise StartRefused(
             f"the velocity is not clear yet (sigma {sigma:.2f} m/s, still changing by {moved:.2f} m/s): "
-            "hold still, or move where there is more than open ground in view"
+            "hold still, or move where there is more than open ground in view",
+            TRIED,
         )
 
 

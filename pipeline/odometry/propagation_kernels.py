@@ -38,12 +38,15 @@ def propagate(
     for k in range(count - 1):
         dt = imu[k + 1, 0] - imu[k, 0]
         rate = 0.5 * (imu[k, 1:4] + imu[k + 1, 1:4]) - gyro_bias
+        unheard = dt > noise[8]
+        if unheard:
+            rate[:] = 0.0  # nobody knows: the speed is kept, the turn is not
         turn = exp(rate * dt)
         after = rotation @ turn
         force = 0.5 * (imu[k, 4:7] + imu[k + 1, 4:7]) - accel_bias
         acceleration = 0.5 * (rotation @ (imu[k, 4:7] - accel_bias) + after @ (imu[k + 1, 4:7] - accel_bias)) + gravity
-        if dt > noise[8]:
-            acceleration[:] = 0.0  # nobody knows: the speed is kept
+        if unheard:
+            acceleration[:] = 0.0
         _write(knots[k], imu[k, 0], rotation, position, velocity, acceleration, rate)
 
         half = rotation @ exp(0.5 * rate * dt)

@@ -48,6 +48,13 @@ class VoxelMap:
         """Voxel size of each level in m, fine to coarse."""
         return self._sizes
 
+    def places(self) -> Doubles:
+        """Low corners (k, 3) of all fine voxels, in m; slow, for once in a while."""
+        keys = self._grid.slots[:, 0]
+        keys = keys[(keys != kernels.EMPTY) & (keys >> (3 * kernels.BITS) < kernels.SIDES)]
+        fields = [(keys >> (k * kernels.BITS)) & kernels.FIELD for k in (2, 1, 0)]
+        return np.asarray(self._sizes[0] * (np.column_stack(fields) - kernels.HALF))
+
     def insert(self, clusters: Doubles, rotation: Doubles, position: Doubles) -> None:
         """Take in the clusters of a scan, seen from a pose, and forget a little of what is far."""
         self._scan += 1

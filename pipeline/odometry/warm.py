@@ -6,8 +6,9 @@ import numpy as np
 
 from drivers.messages import ImuSample, LidarScan
 from pipeline.odometry.config import OdometryConfig
-from pipeline.odometry.odometry import SWEEP_NS, LidarInertialOdometry
+from pipeline.odometry.odometry import LidarInertialOdometry
 from pipeline.odometry.so3 import Doubles
+from pipeline.odometry.start import SWEEP_NS
 from pipeline.odometry.state import GRAVITY_M_S2
 
 SCANS, SAMPLES = 25, 20

@@ -283,4 +283,6 @@ def test_the_pose_says_way_speed_and_sigma_and_what_was_left_out():
     assert "40% of the points, 7 sweeps left out" in text_of(location_line(behind))
     starting = changed(LOCATION, state="starting", note="keep still for a moment")
     assert text_of(location_line(starting)).endswith("keep still for a moment")
+    unsure = changed(LOCATION, state="degenerate", note="no points for 2.0 s")
+    assert text_of(location_line(unsure)).endswith("no points for 2.0 s")
     assert any(Tone.BAD.badge == style for _, style in location_line(changed(LOCATION, state="lost")))

@@ -77,3 +77,11 @@ def test_samples_without_scans_do_not_pile_up():
     for k in range(20_000):
         assert not list(pairing.add(sample(k * 5)))
     assert len(next(iter(pairing.add(scan(99_800)))).imu) <= 4000
+
+
+def test_a_stray_stamp_costs_itself_alone():
+    messages = walk(8)
+    _, expected = sweeps(messages)
+    pairing, found = sweeps([*messages[:40], sample(100_000), *messages[40:60], scan(100_000), *messages[60:]])
+    assert [(s.scan.stamp_ns, stamps_ms(s)) for s in found] == [(s.scan.stamp_ns, stamps_ms(s)) for s in expected]
+    assert (pairing.left.scans, pairing.left.samples) == (1, 1)
