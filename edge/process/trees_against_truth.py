@@ -26,7 +26,7 @@ from pipeline.trees import Tree
 
 Array = npt.NDArray[np.float64]
 WITHIN_M = 15.0
-"""Of the way: what should be found."""
+"""Of the way, and of the camera while it saw the tree: what should be found."""
 SEEN_S = 1.0
 """By the camera, in sum."""
 
@@ -64,7 +64,7 @@ def _targets(world: World, within_ns: tuple[int, int]) -> tuple[Array, npt.NDArr
     """Places (n, 2) of all of the species, and (n,) which of them should be found."""
     which = world.trees.species == Species.TREE_OF_HEAVEN
     places = world.trees.position_m[which, :2]
-    seen = seen_s(world, [Species.TREE_OF_HEAVEN], Annotation(), within_ns)[which]
+    seen = seen_s(world, [Species.TREE_OF_HEAVEN], Annotation(within_m=WITHIN_M), within_ns)[which]
     return places, (seen >= SEEN_S) & (from_way_m(world, places) <= WITHIN_M)
 
 
