@@ -33,6 +33,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "process": ("edge.cli.process", "odometry, GNSS fusion, detection and products from a recording"),
     "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
     "dataset": ("edge.cli.dataset", "training data from recordings and photos, and a model from them"),
+    "calibrate": ("edge.cli.calibrate", "the lens, where the camera sits, and how late its stamps are"),
     "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }
 """command -> (module with HELP, add_arguments and run; summary). Import strings: `status` must not load numba."""
