@@ -11,6 +11,7 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from pipeline.calibration.errors import CalibrationError
 
@@ -84,14 +85,13 @@ def find(board: Board, name: str, grey: Image) -> Sighting | None:
     if not there:
         return None
     rough = (np.asarray(found, np.float32).reshape(-1, 1, 2) + 0.5) / shrunk - 0.5
-    return Sighting(name, board.corners_m, _refined(grey, rough, size))
+    return Sighting(name, board.corners_m, _refined(grey, rough, 0.35))
 
 
-def _refined(grey: Image, rough: npt.NDArray[np.float32], size: tuple[int, int]) -> Array:
-    """Corners to a tenth of a pixel, in a window that reaches no other corner."""
-    grid = rough.reshape(size[1], size[0], 2)
-    apart = min(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1))
-    half = int(np.clip(0.35 * apart, 2, 9))
+def _refined(grey: Image, rough: npt.NDArray[np.float32], reach: float) -> Array:
+    """Corners to a tenth of a pixel, in a window that reaches so far, in squares, which must not be to anything else."""
+    apart, _ = cKDTree(rough.reshape(-1, 2)).query(rough.reshape(-1, 2), 2)
+    half = int(np.clip(reach * apart[:, 1].min(), 2, 9))
     corners = cv2.cornerSubPix(grey, rough.astype(np.float32), (half, half), (-1, -1), _CRITERIA)
     return np.asarray(corners, np.float64).reshape(-1, 2)
 
@@ -111,7 +111,10 @@ def _find_charuco(board: Board, name: str, grey: Image) -> Sighting | None:
     corners, ids, _, _ = cv2.aruco.CharucoDetector(_charuco(board)).detectBoard(grey)
     if ids is None or len(ids) < LEAST_CORNERS:
         return None
-    return Sighting(name, board.corners_m[ids.ravel()], np.asarray(corners, np.float64).reshape(-1, 2))
+    rough = np.asarray(corners, np.float32).reshape(-1, 1, 2)
+    # As OpenCV 4.11 gives them they are half a pixel off. Markers end short of the corners by this much.
+    reach = 0.45 * (1.0 - board.marker_m / board.square_m)
+    return Sighting(name, board.corners_m[np.asarray(ids).ravel()], _refined(grey, rough, reach))
 
 
 def _charuco(board: Board) -> Any:
