@@ -65,7 +65,7 @@ class CalibrationRecording:
         for frame in VideoFrames(self.store, self.video).read(choose_):
             yield frame.stamp_ns, frame.image_bgr
 
-    def points(self, first_ns: int, last_ns: int) -> Iterator[LidarScan]:
+    def scans(self, first_ns: int, last_ns: int) -> Iterator[LidarScan]:
         """The sweeps stamped between two instants."""
         topic = self.topics.lidar
         kind = self.store.topics[topic].type_name

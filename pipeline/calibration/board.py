@@ -73,6 +73,12 @@ class Sighting:
     board_m: Array
     pixels: Array
 
+    @property
+    def by_corner(self) -> dict[tuple[float, float], Array]:
+        """Pixel of each corner, by where it is on the board (metres)."""
+        keys = np.round(self.board_m[:, :2], 6).tolist()
+        return {(x, y): pixel for (x, y), pixel in zip(keys, self.pixels, strict=True)}
+
 
 def find(board: Board, name: str, grey: Image) -> Sighting | None:
     """The board in a grey picture; None where it is not, or shows too few corners."""
@@ -89,9 +95,9 @@ def find(board: Board, name: str, grey: Image) -> Sighting | None:
 
 
 def _refined(grey: Image, rough: npt.NDArray[np.float32], reach: float) -> Array:
-    """Corners to a tenth of a pixel, in a window that reaches so far, in squares, which must not be to anything else."""
-    apart, _ = cKDTree(rough.reshape(-1, 2)).query(rough.reshape(-1, 2), 2)
-    half = int(np.clip(reach * apart[:, 1].min(), 2, 9))
+    """Corners to a tenth of a pixel. reach: of the window, in squares; there must be nothing else in it."""
+    near, _ = cKDTree(rough.reshape(-1, 2)).query(rough.reshape(-1, 2), [2])
+    half = int(np.clip(reach * np.min(near), 2, 9))
     corners = cv2.cornerSubPix(grey, rough.astype(np.float32), (half, half), (-1, -1), _CRITERIA)
     return np.asarray(corners, np.float64).reshape(-1, 2)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.calibration.board import Array, Sighting
+from pipeline.calibration.board import Sighting
 
 NEW_PLACE = 0.06
 """Of the picture's width: nearer than this to a chosen one, the board is where it was."""
@@ -55,13 +55,8 @@ class Choice:
 
     def _apart(self, one: Sighting, two: Sighting) -> float:
         """Mean way of the corners that both show; another part of the board is another place."""
-        a, b = _by_corner(one), _by_corner(two)
+        a, b = one.by_corner, two.by_corner
         both = a.keys() & b.keys()
         if len(both) < 4:
             return 1.0
         return float(np.mean([np.linalg.norm(a[k] - b[k]) for k in both])) / self._width_px
-
-
-def _by_corner(sighting: Sighting) -> dict[tuple[float, float], Array]:
-    keys = np.round(sighting.board_m[:, :2], 6).tolist()
-    return {(x, y): pixel for (x, y), pixel in zip(keys, sighting.pixels, strict=True)}
