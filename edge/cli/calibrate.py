@@ -15,6 +15,7 @@ HELP = """how the camera sees, where it sits, and how late its stamps are: one f
 example: mapforest calibrate print board.png --corners 9x6 --square 0.025 --marker 0.018
          mapforest calibrate lens board.mp4 --corners 9x6 --square 0.025 --file payload-1.toml
          mapforest calibrate board recordings/20261124T102000Z_board --corners 8x5 --square 0.08 --file payload-1.toml
+         mapforest calibrate scene recordings/20261124T103000Z_standing --file payload-1.toml --picture overlay.png
          mapforest calibrate time recordings/20261124T101500Z_turning --file payload-1.toml
 
 Set `calibration = "payload-1.toml"` in the configuration afterwards: it then goes into every recording. A step that

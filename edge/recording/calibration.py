@@ -72,7 +72,7 @@ class About(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which unit, when, and how sure. Serial numbers as the sensors tell them; empty: not known.
 
     date: of the last change. camera_pose_by: "board" or "scene"; empty: measured by hand. camera_pose_residual: RMS of
-    that, metres off the board's plane, or pixels for a scene.
+    that, metres off the board's plane; 0: there is none.
     """
 
     date: str = ""
