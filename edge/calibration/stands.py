@@ -84,11 +84,9 @@ def _unswayed(scan: LidarScan, gyro: Turning, at_ns: int, lidar: Pose, half_ns: 
     clean = (scan.tag & _CLEAN) == 0
     points = scan.xyz_m[clean].astype(np.float64)
     around = gyro.within(at_ns - 2 * half_ns, at_ns + 2 * half_ns)
+    bias = gyro.within(at_ns - half_ns, at_ns + half_ns).rate.mean(axis=0)  # it stood still then; before, it may not
     edges_s = (around.end_ns - at_ns) * 1e-9
-    # The mean while standing is the gyroscope's bias.
-    angle = np.cumsum(
-        (around.rate - around.rate.mean(axis=0)) * ((around.end_ns - around.begin_ns) * 1e-9)[:, None], axis=0
-    )
+    angle = np.cumsum((around.rate - bias) * ((around.end_ns - around.begin_ns) * 1e-9)[:, None], axis=0)
     times_s = (scan.stamp_ns - at_ns + scan.offset_ns[clean].astype(np.int64)) * 1e-9
     turn = np.column_stack([np.interp(times_s, edges_s, a) - np.interp(0.0, edges_s, a) for a in angle.T])
     mounting, lever = Rotation.from_quat(lidar.rotation_xyzw), np.array(lidar.translation_m)

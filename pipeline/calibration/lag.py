@@ -35,7 +35,7 @@ class Lag:
     rotation: Array
 
 
-def find_lag(first: Turning, second: Turning, least_s: float, most_s: float) -> Lag:
+def find_lag(first: Turning, second: Turning, least_s: float, most_s: float, overlap_s: float = LEAST_OVERLAP_S) -> Lag:
     """The best lag from `least_s` to `most_s`. CalibrationError when the two have too little time in common."""
     if not len(first) or not len(second):
         raise CalibrationError("one of the two recordings shows no turning at all")
@@ -43,10 +43,10 @@ def find_lag(first: Turning, second: Turning, least_s: float, most_s: float) -> 
     lags_s = (int(second.begin_ns[0]) - int(first.begin_ns[0])) * 1e-9 + GRID_S * np.arange(1 - len(a), len(b))
     within = (lags_s >= least_s) & (lags_s <= most_s)
     seconds = GRID_S * _correlate(have_a, have_b)[within]
-    enough = seconds >= LEAST_OVERLAP_S
+    enough = seconds >= overlap_s
     if not enough.any():
         raise CalibrationError(
-            f"the two recordings have less than {LEAST_OVERLAP_S:g} s in common at any offset from {least_s:g} to "
+            f"the two recordings have less than {overlap_s:g} s in common at any offset from {least_s:g} to "
             f"{most_s:g} s: were they made at the same time? Allow a greater offset, or record longer"
         )
     cross = np.stack([[_correlate(a[:, i], b[:, j])[within] for j in range(3)] for i in range(3)])

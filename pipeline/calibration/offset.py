@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.calibration.lag import Lag, best_rotation, find_lag
+from pipeline.calibration.lag import LEAST_OVERLAP_S, Lag, best_rotation, find_lag
 from pipeline.calibration.turning import Angle, Array, Turning
 
 STRETCH_S = 4.0
@@ -50,9 +50,11 @@ class TimeOffset:
     refusal: str = ""
 
 
-def find_offset(first: Turning, second: Turning, least_s: float = -2.0, most_s: float = 2.0) -> TimeOffset:
+def find_offset(
+    first: Turning, second: Turning, least_s: float = -2.0, most_s: float = 2.0, overlap_s: float = LEAST_OVERLAP_S
+) -> TimeOffset:
     """first: the camera; second: a gyroscope on the same body. CalibrationError when nothing can be compared."""
-    lag = find_lag(first, second, least_s, most_s)
+    lag = find_lag(first, second, least_s, most_s, overlap_s)
     angle = Angle(second)
     later_s, rotation = lag.later_s, lag.rotation
     for _ in range(3):
