@@ -21,9 +21,9 @@ class Units(msgspec.Struct, frozen=True):
     camera: str = ""
 
 
-def serial_of(details: Mapping[str, str]) -> str:
+def serial_of(details: Mapping[str, object]) -> str:
     """The serial number among what a sensor says of itself; empty where it does not tell."""
-    return next((details[key] for key in _KEYS if details.get(key)), "")
+    return next((str(details[key]) for key in _KEYS if details.get(key)), "")
 
 
 def others(about: About, units: Units) -> Iterator[str]:
