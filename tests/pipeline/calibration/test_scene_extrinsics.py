@@ -73,6 +73,7 @@ def test_a_fisheye_lens_is_straightened_first():
     assert np.linalg.norm(found.extrinsics.camera_m - TRUE.camera_m) < 0.04
 
 
+@pytest.mark.slow
 def test_pictures_of_another_place_cannot_be_told(stands):
     mixed = [Stand(stands[(k + 1) % 3].image_bgr, stand.points_m) for k, stand in enumerate(stands)]
     assert from_scene(mixed, CAMERA, guess(3)).refusal
