@@ -38,7 +38,7 @@ def time_offset(seed: int, name: str) -> Iterator[str]:
     mounted = Rotation.from_matrix(found.rotation @ forest.CAMERA.rotation)
     yield (
         f"| time | {name} {seed} | {1e3 * error_s:+.2f} ms | {1e3 * found.sigma_s:.2f} ms | "
-        f"{abs(error_s) / found.sigma_s:.1f} in sigma, correlation {found.correlation:.3f} ({found.rival:.2f} elsewhere), "
+        f"{abs(error_s) / found.sigma_s:.1f} in sigma, correlation {found.correlation:.3f} (else {found.rival:.2f}), "
         f"rotation in passing {np.degrees(mounted.magnitude()):.2f} deg | {found.refusal or 'told'} |"
     )
 
