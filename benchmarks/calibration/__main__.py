@@ -89,11 +89,11 @@ def _pose(step: str, what: str, found: Found, true: Extrinsics, more: str) -> st
     error = found.extrinsics.step_from(true)
     away_m = np.linalg.norm(found.extrinsics.camera_m - true.camera_m)
     nees = error @ np.linalg.solve(found.covariance, error) / 6.0
-    return (
-        f"| {step} | {what} | {np.degrees(np.linalg.norm(error[:3])):.2f} deg, {100 * away_m:.1f} cm | "
-        f"{found.rotation_sigma_deg:.2f} deg, {100 * found.translation_sigma_m:.1f} cm | NEES {nees:.2f}, {more} | "
-        f"{found.refusal.partition(':')[0] or 'told'} |"
-    )
+    sure = f"{found.rotation_sigma_deg:.2f} deg, {100 * found.translation_sigma_m:.1f} cm | NEES {nees:.2f}, "
+    if found.refusal:
+        sure = "- | "
+    away = f"{np.degrees(np.linalg.norm(error[:3])):.2f} deg, {100 * away_m:.1f} cm"
+    return f"| {step} | {what} | {away} | {sure}{more} | {found.refusal.partition(':')[0] or 'told'} |"
 
 
 STEPS = {"time": time_offset, "lens": lens, "board": board, "scene": scene}
