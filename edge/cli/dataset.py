@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import cast
 
 from edge.cli import dataset_in, dataset_out, dataset_split, dataset_train
+from edge.cli.steps import add_steps
 from edge.errors import EdgeError, UsageError
 
 HELP = """from recordings and photos to training data, and from those to a model for the payload
@@ -26,23 +26,7 @@ through all of it. `mapforest dataset WHAT --help` has the options of each step.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """A parser for each step; what holds for all may stand before or after its name."""
-    steps = parser.add_subparsers(title="steps", metavar="WHAT", dest="what", required=True)
-    for module in (dataset_in, dataset_out, dataset_split, dataset_train):
-        for name, (summary, add, run) in module.STEPS.items():
-            step = steps.add_parser(
-                name, help=summary, description=summary, formatter_class=argparse.RawDescriptionHelpFormatter
-            )
-            _add_common(step)
-            add(step)
-            step.set_defaults(step=run)
-
-
-def _add_common(step: argparse.ArgumentParser) -> None:
-    """The options of every command once more, without a default that would undo what stood before the step."""
-    told = argparse.SUPPRESS
-    step.add_argument("--config", type=Path, default=told, metavar="FILE", help="TOML configuration")
-    step.add_argument("--json", action="store_true", default=told, help="print JSON for programs")
-    step.add_argument("--verbose", "-v", action="store_true", default=told, help="say more on standard error")
+    add_steps(parser, (dataset_in, dataset_out, dataset_split, dataset_train))
 
 
 def run(args: argparse.Namespace) -> int:

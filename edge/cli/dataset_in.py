@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from edge.cli import exit_codes
-from edge.cli.dataset_step import Step, named, some, tell
 from edge.cli.stage_bar import StageBar
+from edge.cli.steps import Step, named, some, tell
 from edge.config import load
 from edge.errors import UsageError
 

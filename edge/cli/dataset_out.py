@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from edge.cli import exit_codes
-from edge.cli.dataset_step import Step, some, tell
+from edge.cli.steps import Step, some, tell
 
 
 def _tasks_options(parser: argparse.ArgumentParser) -> None:

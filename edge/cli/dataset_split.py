@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from edge.cli import exit_codes
-from edge.cli.dataset_step import Step, out, some, table, tell
+from edge.cli.steps import Step, out, some, table, tell
 from edge.errors import UsageError
 
 if TYPE_CHECKING:  # heavy: scipy, OpenCV

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from edge.cli import exit_codes
-from edge.cli.dataset_step import Step, tell
+from edge.cli.steps import Step, tell
 from edge.cli.words import console
 from edge.errors import UsageError
 

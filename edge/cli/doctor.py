@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Mapping
 
 import msgspec
 from rich.console import Console
@@ -15,7 +16,7 @@ from edge.control.client import ControlClient
 from edge.control.messages import Status
 from edge.errors import ControlError
 from edge.paths import find_control_socket
-from edge.preflight import detection, disk, host, sensors
+from edge.preflight import calibration, detection, disk, host, sensors
 from edge.preflight.check import Check, Outcome
 from edge.service.host_clock import discipline
 
@@ -57,18 +58,29 @@ def _running(config: Config) -> Status | None:
 
 def _checks(config: Config, status: Status | None, listen_s: float) -> list[Check]:
     clock = discipline()
+    heard, details = _sensors(config, status, listen_s)
     recorder = Check("recorder", Outcome.GOOD, f"running, {status.state}") if status else _not_running()
     return [
         recorder,
-        *(sensors.check_running(status) if status else sensors.check_directly(config, listen_s)),
+        *heard,
         *disk.check_disk(config.recording),
         host.check_clock(time.time(), clock.synchronised, clock.source),
         host.check_kernel(),
         *host.check_permissions(config),
-        host.check_calibration(config),
+        *calibration.check_calibration(config, calibration.units_of(config, details)),
         *detection.check_detection(config),
         host.check_programs(),
     ]
+
+
+def _sensors(
+    config: Config, status: Status | None, listen_s: float
+) -> tuple[list[Check], dict[str, Mapping[str, object]]]:
+    """And what each says of itself."""
+    if status is not None:
+        return sensors.check_running(status), {sensor.name: sensor.details for sensor in status.sensors}
+    healths = sensors.listen(config, listen_s)
+    return sensors.check_heard(healths), {health.name: health.details for health in healths}
 
 
 def _not_running() -> Check:

@@ -34,6 +34,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "report": ("edge.cli.report", "one HTML page a session: verdict, map, trees, sensors, what to do"),
     "evaluate": ("edge.cli.evaluate", "estimates against ground truth"),
     "dataset": ("edge.cli.dataset", "training data from recordings and photos, and a model from them"),
+    "calibrate": ("edge.cli.calibrate", "the lens, where the camera sits, and how late its stamps are"),
+    "import-video": ("edge.cli.import_video", "the camera's own files onto the time of a session"),
     "sim": ("edge.cli.sim", "the emulated payload alone, with faults on demand"),
 }
 """command -> (module with HELP, add_arguments and run; summary). Import strings: `status` must not load numba."""

@@ -1,4 +1,4 @@
-"""The computer: time, kernel limits, permissions, and the calibration that a session would carry."""
+"""The computer: time, kernel limits, permissions."""
 
 from __future__ import annotations
 
@@ -44,16 +44,6 @@ def check_permissions(config: Config) -> list[Check]:
         return [Check("permissions", Outcome.GOOD, "this user may open serial ports")]
     advice = "sudo usermod -aG dialout $USER, then log in again"
     return [Check("permissions", Outcome.BAD, f"this user may not open serial ports (for {', '.join(serial)})", advice)]
-
-
-def check_calibration(config: Config) -> Check:
-    """A session carries its calibration; the nominal geometry is good enough to record with."""
-    if not config.calibration:
-        return Check("calibration", Outcome.WARNING, "nominal geometry", "calibrate before mapping trees from images")
-    path = Path(config.calibration).expanduser()
-    if path.is_file():
-        return Check("calibration", Outcome.GOOD, str(path))
-    return Check("calibration", Outcome.BAD, f"{path} is not there", "correct `calibration` in the configuration")
 
 
 def check_programs() -> Check:

@@ -27,7 +27,12 @@ def check_running(status: Status) -> list[Check]:
     return [_from_status(sensor) for sensor in status.sensors]
 
 
-def check_directly(config: Config, listen_s: float = LISTEN_S) -> list[Check]:
+def check_heard(healths: list[SensorHealth]) -> list[Check]:
+    """The sensors as they were when listened to."""
+    return [_from_health(health) for health in healths]
+
+
+def listen(config: Config, listen_s: float = LISTEN_S) -> list[SensorHealth]:
     """Start each driver without recording, and wait until it delivers or `listen_s` is over."""
     drivers = [_build(config, name) for name in config.sensors]
     stop = threading.Event()
@@ -35,7 +40,7 @@ def check_directly(config: Config, listen_s: float = LISTEN_S) -> list[Check]:
     for thread in threads:
         thread.start()
     try:
-        return [_from_health(health) for health in _wait(drivers, time.monotonic() + listen_s)]
+        return _wait(drivers, time.monotonic() + listen_s)
     finally:
         stop.set()
         for thread in threads:

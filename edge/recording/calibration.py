@@ -53,17 +53,27 @@ class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
     residual_px: float = 0.0
     """RMS of the calibration; 0: nominal."""
+    date: str = ""
 
 
 class Timing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """camera_late_s: by so much the camera's stamps are later than the exposure they stand for."""
+    """camera_late_s: by so much the camera's stamps are later than the exposure they stand for.
+
+    correlation: of the turning of camera and IMU there, 0..1; 0: not measured.
+    """
 
     camera_late_s: float = 0.0
     sigma_s: float = 0.02
+    correlation: float = 0.0
+    date: str = ""
 
 
 class About(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which unit, when, and how sure. Serial numbers as the sensors tell them; empty: not known."""
+    """Which unit, when, and how sure. Serial numbers as the sensors tell them; empty: not known.
+
+    date: of the last change. camera_pose_by: "board" or "scene"; empty: measured by hand. camera_pose_residual: RMS of
+    that, metres off the board's plane; 0: there is none.
+    """
 
     date: str = ""
     lidar_serial: str = ""
@@ -71,6 +81,9 @@ class About(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     camera_lens: str = ""
     camera_rotation_sigma_deg: float = 1.0
     camera_translation_sigma_m: float = 0.02
+    camera_pose_by: Literal["", "board", "scene"] = ""
+    camera_pose_residual: float = 0.0
+    camera_pose_date: str = ""
     notes: str = ""
 
 

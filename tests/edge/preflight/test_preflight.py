@@ -3,9 +3,10 @@ import threading
 import pytest
 
 from drivers.driver import SensorHealth, SensorState, StreamHealth
+from edge.calibration.units import Units
 from edge.config import Config, Recording
 from edge.control.messages import Host, Sensor, Status, Stream
-from edge.preflight import disk, host, sensors
+from edge.preflight import calibration, disk, host, sensors
 from edge.preflight.check import Outcome
 from edge.preflight.disk import WriteSpeed
 
@@ -16,7 +17,11 @@ def outcomes(checks):
 
 def test_every_finding_that_is_not_good_comes_with_advice(tmp_path):
     config = Config(recording=Recording(folder=str(tmp_path), require_mount=True), calibration="/nowhere/calib.toml")
-    checks = [*disk.check_disk(config.recording), host.check_calibration(config), host.check_clock(0.0, False, "")]
+    checks = [
+        *disk.check_disk(config.recording),
+        *calibration.check_calibration(config, Units()),
+        host.check_clock(0.0, False, ""),
+    ]
     assert Outcome.BAD in outcomes(checks).values()
     assert all(check.advice for check in checks if check.outcome is not Outcome.GOOD)
 
@@ -89,6 +94,6 @@ class Present:
 def test_without_a_recorder_the_sensors_are_listened_to_and_left_alone_again(monkeypatch):
     driver = Present()
     monkeypatch.setattr(sensors, "_build", lambda config, name: driver)
-    (check,) = sensors.check_directly(Config(sensors={"livox": {}}), listen_s=10.0)
+    (check,) = sensors.check_heard(sensors.listen(Config(sensors={"livox": {}}), listen_s=10.0))
     assert check.outcome is Outcome.GOOD
     assert driver.stopped.is_set()

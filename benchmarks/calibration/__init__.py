@@ -1,0 +1,1 @@
+"""Errors of the calibration against simulated truth."""

@@ -1,0 +1,1 @@
+"""The camera's own files, brought onto the time of a session."""
