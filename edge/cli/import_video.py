@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from edge.cli import exit_codes
 from edge.cli.stage_bar import StageBar
 from edge.cli.steps import tell
-from edge.cli.words import duration
 from edge.config import load
 from edge.errors import EdgeError, UsageError
+from edge.words import duration
 
 if TYPE_CHECKING:
     from edge.onboard.bring import BringReport
