@@ -113,8 +113,8 @@ class Detection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Path of an ONNX file, "demo" for the one that comes along, or empty for no detection."""
     confidence: Share = 0.0
     """Least score of a box. 0: what the model's file advises, 0.35 where it says nothing."""
-    iou: Share = 0.5
-    """Boxes of one class that overlap by more are one."""
+    iou: Share = 0.0
+    """Boxes of one class that overlap by more are one. 0: what the model's file advises, 0.5 where it says nothing."""
     rate_hz: Positive = 2.0
     """Images a second that are looked at; live at most."""
     threads: Annotated[int, msgspec.Meta(ge=0)] = 0

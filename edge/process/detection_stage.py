@@ -62,13 +62,13 @@ class DetectionStage:
         return found
 
     def _model(self) -> ModelFacts:
-        info, settings = self.detector.info, self.config.detection
+        info = self.detector.info
         return ModelFacts(
             info.name,
             info.sha256,
             info.class_names,
             info.device,
             self.detector.confidence,
-            settings.iou,
+            self.detector.iou,
             info.demonstration,
         )

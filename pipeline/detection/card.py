@@ -17,8 +17,9 @@ _DEMONSTRATION = "demonstration"
 class Card:
     """names: of the classes, empty where it does not say. size_px: height and width it was exported for, None likewise.
 
-    stride: the input's sides are multiples of it. final: its boxes have been through a suppression. confidence: least
-    score its maker advises, 0 likewise. demonstration: its maker says that it is good for showing the software only.
+    stride: the input's sides are multiples of it. final: its boxes have been through a suppression. confidence,
+    iou: least score and most overlap that its maker advises, 0 likewise. demonstration: its maker says that it is good
+    for showing the software only.
     """
 
     names: tuple[str, ...] = ()
@@ -26,11 +27,13 @@ class Card:
     stride: int = STRIDE
     final: bool = False
     confidence: float = 0.0
+    iou: float = 0.0
     demonstration: bool = False
 
 
 def read_card(metadata: Mapping[str, str]) -> Card:
-    """As Ultralytics writes it, and `confidence`: values are Python literals. ModelForeign for what cannot be meant."""
+    """As Ultralytics writes it, and `confidence` and `iou`; values are Python literals. ModelForeign for what cannot be
+    meant."""
     task = metadata.get("task", "detect")
     if task != "detect":
         raise ModelForeign(f"its task is {task!r}, expected 'detect'; export a detection model")
@@ -40,7 +43,8 @@ def read_card(metadata: Mapping[str, str]) -> Card:
         size_px=_size_px(metadata),
         stride=_stride(metadata),
         final=metadata.get("end2end") == "True" or (isinstance(arguments, dict) and arguments.get("nms") is True),
-        confidence=_confidence(metadata),
+        confidence=_share(metadata, "confidence"),
+        iou=_share(metadata, "iou"),
         demonstration=any(_DEMONSTRATION in value.lower() for value in metadata.values()),
     )
 
@@ -75,12 +79,12 @@ def _stride(metadata: Mapping[str, str]) -> int:
     return int(found)
 
 
-def _confidence(metadata: Mapping[str, str]) -> float:
-    found = _literal(metadata, "confidence")
+def _share(metadata: Mapping[str, str], key: str) -> float:
+    found = _literal(metadata, key)
     if found is None:
         return 0.0
     if not isinstance(found, (int, float)) or not 0.0 < found <= 1.0:
-        raise _odd(metadata, "confidence", "a score above 0, at most 1, such as 0.35")
+        raise _odd(metadata, key, "a number above 0, at most 1, such as 0.35")
     return float(found)
 
 

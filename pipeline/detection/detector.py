@@ -29,15 +29,15 @@ _SLACK = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """confidence: least score; 0: what the model advises, else `CONFIDENCE`. iou: boxes of a class that overlap by more
-    are one. most: boxes of an image.
+    """confidence: least score; iou: boxes of a class that overlap by more are one; 0: what the model advises, else
+    `CONFIDENCE` and `IOU`. most: boxes of an image.
 
     input_px: longer side of the input, where the model leaves it open. threads: 0 for as many as there are cores.
     cache: for what TensorRT builds.
     """
 
     confidence: float = 0.0
-    iou: float = IOU
+    iou: float = 0.0
     most: int = 300
     input_px: int = OPEN_INPUT_PX
     device: Device = "auto"
@@ -99,6 +99,8 @@ class Detector:
         )
         self.confidence = self._settings.confidence or self.info.advised
         """Least score."""
+        self.iou = self._settings.iou or card.iou or IOU
+        """Boxes of a class that overlap by more are one."""
 
     def detect(self, image_bgr: Image, stamp_ns: int) -> FrameDetections:
         """image_bgr: (height, width, 3) uint8. InferenceFailed, DetectionError for what is no image."""
@@ -117,7 +119,7 @@ class Detector:
     def _finished(self, found: Found, where: Fit) -> Found:
         """Each thing once, in pixels of the image."""
         if self.info.layout is not Layout.FINAL:
-            found = suppress(found, self._settings.iou, self._settings.most)
+            found = suppress(found, self.iou, self._settings.most)
         found = _inside(Found(where.undo(found.boxes), found.confidence, found.class_id))
         names = len(self.info.class_names)
         if len(found.class_id) and not 0 <= found.class_id.min() <= found.class_id.max() < names:

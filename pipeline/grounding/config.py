@@ -8,9 +8,9 @@ import msgspec
 class EvidenceConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How much one view says of one tree. Shares are of views in which it stands unhidden."""
 
-    recall_near: float = 0.75
+    recall_near: float = 0.65
     """Of the detector within `near_m`; from there it falls to `recall_far` at the farthest range that counts."""
-    recall_far: float = 0.25
+    recall_far: float = 0.4
     near_m: float = 8.0
     false_share: float = 0.04
     """Views in which something else that stands there is taken for the target."""
@@ -20,7 +20,7 @@ class EvidenceConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The same of a place that a box points at where no stem is; often it is another one's box, misplaced."""
     fresh_m: float = 1.0
     """Views from places closer to each other than this see the same again, and count as a part of one."""
-    least_fresh: float = 0.15
+    least_fresh: float = 0.02
     most_log_odds: float = 8.0
 
 

@@ -56,7 +56,8 @@ def sight(box_px: Array, confidence: float, depth: DepthImage, config: Grounding
         return None
     known[known] &= inside[known][:, 2] - depth.ground.at(inside[known][:, :2]) > LOW_M
     weights = _weights(box_px, depth, rows, cols) * known
-    found = _mode(ranges[known], weights[known], config.farthest_m)
+    beyond = _beyond(rows, cols, depth, config.farthest_m)
+    found = _mode(ranges[known], weights[known], beyond, config.farthest_m)
     if found is None:
         return None
     middle, half = found
@@ -87,11 +88,35 @@ def _weights(box_px: Array, depth: DepthImage, rows: slice, cols: slice) -> Arra
     return np.asarray(along[:, None] * across)
 
 
-def _mode(ranges: Array, weights: Array, farthest_m: float) -> tuple[float, float] | None:
-    """Middle and half width (m) of the nearest dense peak of the ranges."""
+def _beyond(rows: slice, cols: slice, depth: DepthImage, farthest_m: float) -> Array:
+    """By bin of range, how much of the box's middle columns goes on above and below it, beside what is in it, 0..1."""
+    third = (cols.stop - cols.start) // 3
+    middle = slice(cols.start + third, max(cols.stop - third, cols.start + third + 1))
+    half = (rows.stop - rows.start) // 2
+    parts = (slice(max(rows.start - half, 0), rows.start), rows, slice(rows.stop, rows.stop + half))
+    above, inside, below = (_histogram(depth, part, middle, farthest_m) for part in parts)
+    return np.asarray(np.clip(np.maximum(above, below) / np.maximum(inside, 1e-6), 0.0, 1.0))
+
+
+def _histogram(depth: DepthImage, rows: slice, cols: slice, farthest_m: float) -> Array:
+    """Share of the cells of a part of the image in each bin of range, smoothed."""
     bins = int(np.ceil(farthest_m / BIN_M)) + 1
+    places = depth.places_m[rows, cols].reshape(-1, 3)
+    if not len(places):
+        return np.zeros(bins)
+    stands = np.isfinite(places[:, 0])
+    stands[stands] &= places[stands, 2] - depth.ground.at(places[stands, :2]) > LOW_M
+    ranges = np.hypot(*(places[stands, :2] - depth.view.position_m[:2]).T)
+    counted = np.bincount(np.minimum((ranges / BIN_M).astype(int), bins), minlength=bins + 1)[:bins]
+    return np.convolve(counted / len(places), [0.25, 0.5, 0.25], "same")
+
+
+def _mode(ranges: Array, weights: Array, beyond: Array, farthest_m: float) -> tuple[float, float] | None:
+    """Middle and half width (m) of the nearest dense peak of the ranges. What goes on beyond the box is not the tree
+    that the box is around."""
+    bins = len(beyond)
     histogram = np.bincount(np.minimum((ranges / BIN_M).astype(int), bins), weights, bins + 1)[:bins]
-    smooth = np.convolve(histogram, [0.25, 0.5, 0.25], "same")
+    smooth = np.convolve(histogram, [0.25, 0.5, 0.25], "same") * (1.05 - beyond)
     if smooth.max() <= 0.0:
         return None
     dense = np.flatnonzero(smooth >= DENSE * smooth.max())

@@ -49,5 +49,6 @@ def card(input_px: tuple[int, int], confidence: float) -> dict[str, str]:
         "imgsz": str(list(input_px)),
         "names": str({0: CLASS_NAME}),
         "confidence": f"{confidence:g}",
+        "iou": "0.65",  # it grows in clumps: the boxes of neighbours overlap
         "purpose": "demonstration only",
     }

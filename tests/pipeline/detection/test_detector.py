@@ -179,7 +179,7 @@ def test_a_truncated_file_is_refused_wherever_it_ends(tmp_path):
         (yolov5(), {}, "not those of 1 x N x 6; export a model of YOLOv8 or later"),
         (np.full((1, 50, 6), 7.0, np.float32), {}, "not between 0 and 1"),
         (said() * np.nan, {}, "not between 0 and 1"),
-        (said(), {"confidence": "1.5"}, "'confidence' is '1.5', expected a score above 0"),
+        (said(), {"confidence": "1.5"}, "'confidence' is '1.5', expected a number above 0"),
         (said(), {"task": "pose"}, "task is 'pose'"),
         (said(), {"names": "{0: 'a', 1: 'b'}"}, "1 x 5 x 200 for 2 classes"),
     ],
