@@ -27,10 +27,11 @@ HELP = """bring a ground map onto an aerial one, which also takes the GNSS bias 
 example: mapforest align lidar_2024.laz recordings/20261124T101500Z_walk/products/map.laz
          mapforest align lidar_2024.laz plot7.ply --start 470640,3810235,12 --search 20
          mapforest align lidar_2024.laz stems.csv --trees trees.gpkg --trees detections.csv
+         mapforest align monday.laz tuesday.laz --sessions
 
 AERIAL: LAS or LAZ in a projected coordinate system in metres, reaching past the ground map by the search.
 TERRESTRIAL: LAS, LAZ or PLY, level; or a CSV of stems with x, y and, better, dbh_cm.
-Writes alignment.json (transform, covariance, verdict), alignment.html and fields_*.png, and if the answer is sure
+Writes alignment.json (transform, covariance, verdict), alignment.html and fields_*.png, and if the answer is sure,
 merged.laz and the tables of --trees in the frame of the aerial map. Where the maps cannot tell, it says so and ends
 with 3: nothing is moved then."""
 
@@ -56,6 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method", choices=["joint", "nmi"], default="joint", help="nmi: the published one, stems alone"
     )
     parser.add_argument("--lobe", choices=["positive", "absolute"], default="positive", help="of the Laplacian")
+    parser.add_argument(
+        "--sessions", action="store_true", help="both are ground maps: any turn, any shift, stems on stems"
+    )
     parser.add_argument("--no-merge", action="store_true", help="leave merged.laz out")
 
 
@@ -115,7 +119,7 @@ def _task(args: argparse.Namespace) -> Task:
         )
     config = AlignmentConfig(search_m=args.search, search_deg=args.turn, method=args.method, lobe=args.lobe)
     start = _start(args.start) if args.start is not None else None
-    return Task(args.aerial, args.terrestrial, config, start, args.crs, args.least_dbh)
+    return Task(args.aerial, args.terrestrial, config, start, args.crs, args.least_dbh, args.sessions)
 
 
 def _start(text: str) -> Transform:

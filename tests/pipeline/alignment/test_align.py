@@ -63,6 +63,19 @@ def test_another_stand_is_not_taken_for_this_one(tmp_path):
     assert not run(Task(air, ground, SEARCH), lambda _: lambda _: None).alignment.sure
 
 
+def test_two_walks_in_one_stand_find_each_other_without_any_coordinates(tmp_path):
+    stand = grow("mixed", 6, side_m=70.0)
+    local = Transform((500_000.0, 5_400_000.0), 500_000.0, 5_400_000.0, 480.0, 140.0)
+    monday = write_las(tmp_path / "monday.laz", from_the_ground(stand, 16.0, OFF, crowns=False), None)
+    other = from_the_ground(stand, 16.0, local, crowns=False, at_m=(9.0, 5.0))
+    tuesday = write_las(tmp_path / "tuesday.laz", other, None)
+    done = run(Task(monday, tuesday, AlignmentConfig(), sessions=True), lambda _: lambda _: None)
+    assert done.alignment.sure, done.alignment.doubts
+    into = done.alignment.transform.after(done.placed.start)
+    expected = OFF.inverse().apply(local.apply(other[::50]))
+    assert np.abs(into.apply(other[::50]) - expected).max() < 0.4
+
+
 def test_a_transform_and_its_inverse_leave_nothing():
     points = np.random.default_rng(1).normal(size=(20, 3)) * 50 + [500_000, 5_400_000, 300]
     second = Transform((499_990.0, 5_400_020.0), -1.0, 0.5, 0.2, 170.0)
