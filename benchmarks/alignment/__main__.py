@@ -22,7 +22,7 @@ def main() -> None:
     parser.add_argument("what", choices=["chablais", "fort-valley", "stands", "poses"])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/forest"))
     parser.add_argument("--count", type=int, default=100, help="perturbations, or seeds")
-    parser.add_argument("--methods", nargs="+", default=list(OURS), help="of ours; 'clique' as well")
+    parser.add_argument("--methods", nargs="*", default=list(OURS), help="of ours; 'clique' as well")
     parser.add_argument("--peers", type=Path, help="a Python with open3d and small_gicp")
     parser.add_argument("--torch", type=Path, help="a Python with torch")
     parser.add_argument("--log", type=Path, default=Path(tempfile.gettempdir()) / "alignment.jsonl")

@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from pipeline.alignment.nmi_kernels import pose_information
 
-SIDES_M = (25, 50, 100, 200)
+SIDES_M = (25, 50, 100)
 CELL_M, BINS, POSES = 0.5, 16, 1000
 MARGIN_M = 12.0
 

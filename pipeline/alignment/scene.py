@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from pipeline.alignment.cloud import Batch
 from pipeline.alignment.grid import MOST_CELLS, Array, Grid, Mask
 from pipeline.alignment.standing import CELL_M, Standing
-from pipeline.alignment.surface import Surface
+from pipeline.alignment.surface import Surface, closed
 
 Source = Callable[[], Iterable[Batch]]
 """Reads the map from its beginning, whenever it is called."""
@@ -65,7 +64,7 @@ def terrestrial_scene(source: Source, grid: Grid) -> Scene:
         standing.add(batch.xyz_m[inside, :2], height[inside])
         low = inside & (height < BELOW_CROWNS_M)
         below += np.bincount(cells[low], minlength=below.size)
-    looked = _closed(below.reshape(grid.shape) >= LEAST_SEEN, CLOSED_M / grid.cell_m)
+    looked = closed(below.reshape(grid.shape) >= LEAST_SEEN, CLOSED_M / grid.cell_m)
     stems = standing.stems_m()
     cells, inside = grid.cells(stems)
     stems = stems[inside & looked.ravel()[cells]]
@@ -78,19 +77,8 @@ def stem_scene(stems_m: Array, weights: Array, grid: Grid) -> Scene:
     at = np.zeros(grid.shape, np.bool_)
     at.reshape(-1)[cells] = True
     radius = max(_widest_gap(stems_m[:, :2]), STEM_MARGIN_M) / grid.cell_m
-    looked = _closed(at, radius, STEM_MARGIN_M / grid.cell_m)
+    looked = closed(at, radius, STEM_MARGIN_M / grid.cell_m)
     return Scene(grid, None, None, np.zeros_like(looked), stems_m, weights, looked)
-
-
-def _closed(mask: Mask, radius: float, grown: float = 0.0) -> Mask:
-    """Gaps up to 2 radius closed, the rim grown by `grown`; all in cells."""
-    if not mask.any():
-        return mask
-    room = int(np.ceil(radius + grown)) + 1
-    padded = np.pad(mask, room)
-    near = ndimage.distance_transform_edt(~padded) <= radius + grown
-    kept = ndimage.distance_transform_edt(np.pad(near, 1))[1:-1, 1:-1] > radius
-    return np.asarray(kept[room:-room, room:-room] | mask)
 
 
 def _widest_gap(stems_m: Array) -> float:

@@ -17,8 +17,8 @@ STEEPEST = 0.6
 ROUGH_M = 0.3
 STRAY_M = 1.0
 """A lowest point this far below its neighbours' lowest points is an echo."""
-REACH_M = 4.0
-"""Cells farther from any point than this say nothing."""
+GAP_M = 4.0
+"""Wider gaps between points say nothing."""
 PIT_M = 2.0
 """Where a beam fell through a crown."""
 SMOOTH_M = 0.5
@@ -52,8 +52,8 @@ class Surface:
 
     @property
     def known(self) -> Mask:
-        """Near enough to points."""
-        return self._near(self.count > 0)
+        """Where points fell, and the gaps between them; not beyond their rim."""
+        return closed(self.count > 0, GAP_M / 2 / self.grid.cell_m)
 
     def terrain_m(self) -> Array:
         """(nx, ny) height of the ground, everywhere; from classified points where there are enough."""
@@ -70,11 +70,6 @@ class Surface:
         height = np.where(self.known, np.maximum(filled(height, ~seen), 0.0), 0.0)
         level = ndimage.median_filter(height, size=3)
         return np.asarray(np.where(level - height > PIT_M, level, height))
-
-    def _near(self, seen: Mask) -> Mask:
-        if seen.all() or not seen.any():
-            return seen
-        return np.asarray(ndimage.distance_transform_edt(~seen) <= REACH_M / self.grid.cell_m)
 
 
 def opened(lowest: Array, cell_m: float) -> Array:
@@ -108,3 +103,14 @@ def filled(height: Array, missing: Mask) -> Array:
         return height
     nearest = ndimage.distance_transform_edt(missing, return_distances=False, return_indices=True)
     return np.asarray(height[tuple(nearest)])
+
+
+def closed(mask: Mask, radius: float, grown: float = 0.0) -> Mask:
+    """Gaps up to 2 radius closed, the rim grown by `grown`; all in cells."""
+    if not mask.any():
+        return mask
+    room = int(np.ceil(radius + grown)) + 1
+    padded = np.pad(mask, room)
+    near = ndimage.distance_transform_edt(~padded) <= radius + grown
+    kept = ndimage.distance_transform_edt(np.pad(near, 1))[1:-1, 1:-1] > radius
+    return np.asarray(kept[room:-room, room:-room] | mask)
