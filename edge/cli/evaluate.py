@@ -26,6 +26,7 @@ example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth
          mapforest evaluate trajectory demo/recordings/20261124T101500Z_demo --truth demo/truth --page plots.html
          mapforest evaluate trajectory estimate.tum --truth truth.tum --over 50
          mapforest evaluate trees demo/recordings/20261124T101500Z_demo --truth demo/truth
+         mapforest evaluate alignment plot7_aligned --truth truth.txt
          mapforest evaluate detection models/ailanthus.onnx datasets/autumn --page curves.html --worst worst.jpg
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
@@ -34,6 +35,8 @@ the emulated payload's truth or another TUM file in the same time: APE and RPE (
 truth by yaw or in all axes; NEES (1 is honest). Live and offline are compared on the Earth: how far they are apart, and
 whether their covariances allow for that.
 trees: the trees that `mapforest process` mapped, against those of the simulated forest that the camera saw.
+alignment: what `mapforest align` wrote (or a folder of many), against another alignment.json or a text of X Y Z YAW:
+errors at the middle of the footprint, and over covariance (3 is expected of plan and turn together).
 detection: an ONNX model ("demo" for ours), or a folder of another program's predictions (YOLO texts with confidences),
 against a folder with images/, labels/, classes.txt and, to be told by site, sites.csv (image,site): precision, recall
 and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew."""
@@ -41,7 +44,9 @@ and F1 at one confidence, average precisions as COCO's, confusion, intervals fro
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("what", choices=["clocks", "trajectory", "trees", "detection"], help="what to evaluate")
+    parser.add_argument(
+        "what", choices=["clocks", "trajectory", "trees", "alignment", "detection"], help="what to evaluate"
+    )
     parser.add_argument(
         "estimate",
         type=Path,
@@ -71,6 +76,10 @@ def run(args: argparse.Namespace) -> int:
         from edge.cli import detections
 
         return detections.run(args)
+    if args.what == "alignment":
+        from edge.cli import alignments
+
+        return alignments.run(args)
     if args.truth is None or args.dataset is not None:
         raise UsageError(f"evaluate {args.what}: give one session, and its truth with --truth")
     if args.what == "trajectory":

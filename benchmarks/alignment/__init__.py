@@ -1,0 +1,1 @@
+"""How well and how fast ground maps are brought onto aerial ones, beside what else there is."""
