@@ -137,9 +137,11 @@ def test_the_sample_file_says_every_key_and_every_default() -> None:
     del raw["sensors"]
     assert toml_table.convert(raw, Config, str(SAMPLE)) == Config()
     # The estimators' settings are no operator's business: their own documents list them.
-    own = ("odometry", "fusion", "grounding", "inventory")
-    known = {key for key in keys(msgspec.to_builtins(Config())) if key.split(".")[0] not in own}
+    known = {key for key in keys(msgspec.to_builtins(Config())) if key.split(".")[0] not in ESTIMATORS}
     assert keys(raw) == known - {"sensors"}
+
+
+ESTIMATORS = ("odometry", "fusion", "grounding", "inventory")
 
 
 @pytest.mark.usefixtures("real_drivers")
