@@ -6,13 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.inventory.trees import ListedTree, RejectedTree
 from pipeline.products import sheet
 from pipeline.products.plots import Dots, Plot
 
+Corner = npt.NDArray[np.float64]
 PICTURE_PX = 96
 _NONE = "-"
+_MAP = "Seen from above, y upwards. Numbers are those of trees.csv; rejected places in grey."
 TARGET = 0.5
 """Probability from which a tree is shown as of the detected species."""
 
@@ -27,9 +30,7 @@ def write_plot_page(
     """Readable offline, without trees too."""
     parts = [sheet.facts(_facts(trees, rejected))]
     parts += [sheet.notes(notes)] if notes else []
-    parts.append(
-        sheet.figure("Stems", _map(trees, rejected), "Numbers are those of trees.csv; rejected places in grey.")
-    )
+    parts.append(sheet.figure("Stems", _map(trees, rejected), _MAP))
     if trees:
         parts.append(sheet.figure("Diameters", _diameters(trees)))
         parts.append(sheet.section("Slices"))
@@ -54,17 +55,22 @@ def _facts(trees: Sequence[ListedTree], rejected: Sequence[RejectedTree]) -> dic
 
 
 def _map(trees: Sequence[ListedTree], rejected: Sequence[RejectedTree]) -> Plot:
-    off = np.array([one.position_m[:2] for one in rejected]).reshape(-1, 2)
+    """From a whole corner: seven digits of a grid leave no room for the plot."""
+    places = np.array([*(tree.position_m[:2] for tree in trees), *(one.position_m[:2] for one in rejected)])
+    corner = np.floor(places.reshape(-1, 2).min(axis=0, initial=np.inf) / 10.0) * 10.0
+    corner = np.where(np.isfinite(corner), corner, 0.0)
     target = [tree.probability > TARGET for tree in trees]
-    some = [_dots(trees, [not t for t in target], "trees", "a")]
+    off = np.array([one.position_m[:2] for one in rejected]).reshape(-1, 2) - corner
+    some = [Dots(off[:, 0], off[:, 1], "rejected", "s"), _dots(trees, [not t for t in target], corner, "trees", "a")]
     if any(target):
-        some.append(_dots(trees, target, "detected species", "t"))
-    return Plot("east m", "north m", dots=[Dots(off[:, 0], off[:, 1], "rejected", "s"), *some], equal=True)
+        some.append(_dots(trees, target, corner, "detected species", "t"))
+    east, north = (f"{value:,.0f}".replace(",", " ") for value in corner.tolist())
+    return Plot(f"x m from {east}", f"y m from {north}", dots=some, equal=True)
 
 
-def _dots(trees: Sequence[ListedTree], which: Sequence[bool], name: str, tone: str) -> Dots:
+def _dots(trees: Sequence[ListedTree], which: Sequence[bool], corner: Corner, name: str, tone: str) -> Dots:
     mine = [tree for tree, meant in zip(trees, which, strict=True) if meant]
-    at = np.array([tree.position_m[:2] for tree in mine]).reshape(-1, 2)
+    at = np.array([tree.position_m[:2] for tree in mine]).reshape(-1, 2) - corner
     return Dots(at[:, 0], at[:, 1], name, tone, [str(tree.tree_id) for tree in mine])
 
 

@@ -5,6 +5,9 @@ import pytest
 
 from pipeline.inventory.errors import InventoryError
 from pipeline.inventory.source import open_map
+from pipeline.inventory.tilemap import TileMap
+from pipeline.products.tiles import TileStore
+from pipeline.products.track import Placement
 
 RANDOM = np.random.default_rng(1)
 FAR = np.array([453_210.25, 5_234_567.5, 310.125])
@@ -83,3 +86,21 @@ def test_broken_files_are_told(tmp_path):
     laspy.LasData(laspy.LasHeader(version="1.4", point_format=6)).write(tmp_path / "empty.las")
     with pytest.raises(InventoryError, match="has no points"):
         open_map(tmp_path / "empty.las")
+
+
+def test_a_sessions_map_knows_where_the_scanner_stood(tmp_path):
+    store = TileStore(tmp_path / "tiles", 16.0, 0.02)
+    positions = np.array([[0.0, 0.0, 1.0], [30.0, 0.0, 1.0]])
+    for sweep, position in enumerate(positions):
+        xyz = position + RANDOM.uniform(-5, 5, (300, 3))
+        store.add(np.column_stack([xyz, np.full(300, 200.0 if sweep else 20.0)]).astype(np.float32), sweep)
+    store.close()
+    shift, quarter = np.tile([2.0, 0.0, 0.0], (2, 1)), np.full(2, np.pi / 2)
+    placement = Placement((40.0, -75.0, 50.0), shift, quarter, np.zeros((2, 6, 6)))
+    source = TileMap(tmp_path / "tiles", 0.02, positions, placement)
+    assert source.count == 600
+    assert source.crs.to_epsg() == 32618
+    for part in source.parts():
+        assert (np.abs(part.xyz_m[:, :2] - part.sensor_m) < 5.01).all()
+        np.testing.assert_array_equal(part.reflector, part.sensor_m[:, 1] > 20)
+    np.testing.assert_allclose(source.placed(np.zeros((1, 3)))[0, :2], [500_000, 4_427_757], atol=1.0)
