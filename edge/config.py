@@ -12,6 +12,7 @@ from edge import toml_table
 from edge.errors import ConfigError
 from pipeline.gnss.config import FusionConfig
 from pipeline.grounding.config import GroundingConfig
+from pipeline.inventory.config import InventoryConfig
 from pipeline.odometry.config import OdometryConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -163,6 +164,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     odometry: OdometryConfig = OdometryConfig()
     fusion: FusionConfig = FusionConfig()
     grounding: GroundingConfig = GroundingConfig()
+    inventory: InventoryConfig = InventoryConfig()
     products: Products = Products()
     detection: Detection = Detection()
     bus: Bus = Bus()

@@ -27,6 +27,7 @@ example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth
          mapforest evaluate trajectory estimate.tum --truth truth.tum --over 50
          mapforest evaluate trees demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate alignment plot7_aligned --truth truth.txt
+         mapforest evaluate diameters plot_inventory --truth field_list.csv --page diameters.html
          mapforest evaluate detection models/ailanthus.onnx datasets/autumn --page curves.html --worst worst.jpg
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
@@ -37,6 +38,8 @@ whether their covariances allow for that.
 trees: the trees that `mapforest process` mapped, against those of the simulated forest that the camera saw.
 alignment: what `mapforest align` wrote (or a folder of many), against another alignment.json or a text of X Y Z YAW:
 errors at the middle of the footprint, and over covariance (3 is expected of plan and turn together).
+diameters: what `mapforest inventory` measured, against a field list (CSV with x, y, dbh_cm in the map's coordinates):
+MRE, RMSE, bias, completeness and commission, a scatter plot.
 detection: an ONNX model ("demo" for ours), or a folder of another program's predictions (YOLO texts with confidences),
 against a folder with images/, labels/, classes.txt and, to be told by site, sites.csv (image,site): precision, recall
 and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew."""
@@ -45,7 +48,9 @@ and F1 at one confidence, average precisions as COCO's, confusion, intervals fro
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "what", choices=["clocks", "trajectory", "trees", "alignment", "detection"], help="what to evaluate"
+        "what",
+        choices=["clocks", "trajectory", "trees", "diameters", "alignment", "detection"],
+        help="what to evaluate",
     )
     parser.add_argument(
         "estimate",
@@ -61,6 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--over", type=float, default=100.0, metavar="M", help="trajectory: stretches of the RPE")
     parser.add_argument("--page", type=Path, metavar="FILE", help="also write plots, as one HTML page")
+    parser.add_argument(
+        "--least", type=float, default=0.0, metavar="CM", help="diameters: leave thinner true stems out"
+    )
     parser.add_argument("--worst", type=Path, metavar="FILE", help="detection: the worst images in one JPEG or PNG")
     parser.add_argument(
         "--confidence",
@@ -82,10 +90,14 @@ def run(args: argparse.Namespace) -> int:
         return alignments.run(args)
     if args.truth is None or args.dataset is not None:
         raise UsageError(f"evaluate {args.what}: give one session, and its truth with --truth")
+    if args.what == "diameters":
+        from edge.cli import diameters
+
+        return diameters.run(args)
     if args.what == "trajectory":
         return _trajectory(args)
     if args.page is not None:
-        raise UsageError("--page: there are plots of trajectories and of detections only")
+        raise UsageError("--page: there are plots of trajectories, diameters and detections only")
     if args.what == "trees":
         return _trees(args)
     reports = clock_reports(args.estimate, args.truth, args.settle)

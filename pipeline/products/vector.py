@@ -25,7 +25,7 @@ _LINE_M = 0.1
 """The line leaves the way by at most this."""
 _VERSION = "1.2"
 """Of the GeoPackage standard: newer ones make GDAL of two years ago, and what is built on it, warn."""
-_LOCAL = (
+LOCAL_CRS = (
     'ENGCRS["local: metres from the start of the session, heading arbitrary",EDATUM["start of the session"],'
     'CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]]'
 )
@@ -34,7 +34,7 @@ _NAMESPACE = uuid.UUID("3c0f1d86-2a2b-4d0e-8a41-52b7ce0a9f6d")
 
 
 @dataclass(frozen=True, slots=True)
-class _Layer:
+class Layer:
     """kind: of its shapes, None for a table without any."""
 
     name: str
@@ -55,10 +55,12 @@ def write_way(path: Path, survey: Survey, columns: Columns, told: Mapping[str, A
     line = shapely.linestrings(points[simplified(points, _LINE_M)])
     facts = {name: text([value]) if isinstance(value, str) else np.array([value]) for name, value in told.items()}
     named = {"run_id": text([survey.session]), "event_start": text([survey.start]), "event_end": text([survey.end])}
-    metric = _metric(survey.site)
-    _write(path, _Layer("track", "LineString Z", metric), [line], {**named, "length_m": np.array([length_m]), **facts})
+    system = metric(survey.site)
+    write_layer(
+        path, Layer("track", "LineString Z", system), [line], {**named, "length_m": np.array([length_m]), **facts}
+    )
     times = survey.stamps_ns.astype("datetime64[ns]").astype("datetime64[ms]")
-    _write(path, _Layer("poses", "Point Z", metric), shapely.points(points), {"time": times, **columns})
+    write_layer(path, Layer("poses", "Point Z", system), shapely.points(points), {"time": times, **columns})
 
 
 def add_findings(path: Path, handout: Handout) -> None:
@@ -68,12 +70,12 @@ def add_findings(path: Path, handout: Handout) -> None:
     """
     site, positions = handout.survey.site, handout.findings.positions_m
     places = positions if site is None else site.geodetic(positions)
-    detections = _Layer("detections", "Point", _LOCAL if site is None else "EPSG:4326", UNVERIFIED)
-    _write(path, detections, shapely.points(places[:, :2]), handout.rows)
+    detections = Layer("detections", "Point", LOCAL_CRS if site is None else "EPSG:4326", UNVERIFIED)
+    write_layer(path, detections, shapely.points(places[:, :2]), handout.rows)
     shapes = [_placed(patch.outline, site) for patch in handout.patches]
-    _write(path, _Layer("patches", "Polygon", _metric(site), UNVERIFIED), shapes, _patch_columns(handout))
+    write_layer(path, Layer("patches", "Polygon", metric(site), UNVERIFIED), shapes, _patch_columns(handout))
     searched = [_placed(handout.searched, site)]
-    _write(path, _Layer("searched_area", "MultiPolygon", _metric(site)), searched, _searched_columns(handout))
+    write_layer(path, Layer("searched_area", "MultiPolygon", metric(site)), searched, _searched_columns(handout))
 
 
 def add_styles(path: Path) -> None:
@@ -92,7 +94,7 @@ def add_styles(path: Path) -> None:
         "owner": text([""] * len(layers)),
         "update_time": np.full(len(layers), np.datetime64("now", "ms")),  # QGIS orders by it
     }
-    _write(path, _Layer("layer_styles"), None, columns)
+    write_layer(path, Layer("layer_styles"), None, columns)
 
 
 def _patch_columns(handout: Handout) -> Columns:
@@ -129,11 +131,13 @@ def _placed(shape: Any, site: Site | None) -> Any:
     return shape if site is None else on_the_grid(shape, site)
 
 
-def _metric(site: Site | None) -> str:
-    return _LOCAL if site is None else f"EPSG:{site.epsg}"
+def metric(site: Site | None) -> str:
+    """The reference system of what is handed out in metres."""
+    return LOCAL_CRS if site is None else f"EPSG:{site.epsg}"
 
 
-def _write(path: Path, layer: _Layer, shapes: Any, columns: Columns) -> None:
+def write_layer(path: Path, layer: Layer, shapes: Any, columns: Columns) -> None:
+    """Into a GeoPackage, which is begun where it is not there."""
     pyogrio.raw.write(
         path,
         None if shapes is None else np.asarray(shapely.to_wkb(np.asarray(shapes, object)), object),

@@ -1,0 +1,1 @@
+"""How well stems and their diameters are found."""

@@ -1,0 +1,82 @@
+"""Plots to be measured: simulated walks, mapped by our own odometry, with the stems that stand there."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.odometry.simulated import SCAN_NS, walk
+from drivers.messages import ImuSample
+from drivers.sim.scenarios import scenario
+from drivers.sim.truth import write_truth
+from drivers.sim.world import build
+from edge.process.sweep_odometry import SweepOdometry
+from edge.replay.pairing import Sweep
+from pipeline.evaluation.trajectory import Trajectory, aligned
+from pipeline.odometry.config import OdometryConfig
+from pipeline.products.tiles import TileStore
+from pipeline.products.track import TrackWriter, read_track
+
+Array = npt.NDArray[np.float64]
+DENSITIES = {"open": "open_trail", "mixed": "demo", "dense": "dense"}
+"""Scenario of each: 280, 700 and 1300 stems a hectare."""
+LENGTH_M = 45.0
+FINEST_M, TILE_M = 0.01, 16.0
+TILES, TRACK = "tiles", "odometry.track"
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """A mapped walk. tiles/: the map in `odom`; odometry.track; truth/: what the emulated payload would write."""
+
+    folder: Path
+
+    def into_world(self) -> tuple[Array, Array]:
+        """Turn (3, 3) and shift (3,) from `odom` into the simulated world, by the two trajectories."""
+        track = read_track(self.folder / TRACK)
+        stamps, true_m = np.load(self.folder / "true_ns.npy"), np.load(self.folder / "true_m.npy")
+        at = np.column_stack([np.interp(track["stamp_ns"], stamps, true_m[:, k]) for k in range(3)])
+        truth = Trajectory(track["stamp_ns"], at, track["rotation"])
+        said = Trajectory(track["stamp_ns"], track["position_m"], track["rotation"])
+        laid = aligned(said, truth, "se3")
+        turn = laid.rotations[0] @ said.rotations[0].T
+        return turn, laid.positions_m[0] - turn @ said.positions_m[0]
+
+
+def plot(density: str, seed: int, cache: Path) -> Plot:
+    """The plot of that name, mapped now or taken from `cache`."""
+    folder = cache / f"{density}_{seed}"
+    if not (folder / "true_m.npy").exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        _map(density, seed, folder)
+    return Plot(folder)
+
+
+def _map(density: str, seed: int, folder: Path) -> None:
+    config = replace(scenario(DENSITIES[density], seed), length_m=LENGTH_M)
+    write_truth(build(config), folder / "truth")
+    cast = walk(config, folder / "walk")
+    samples, used = cast.imu(), 0
+    odometry = SweepOdometry(OdometryConfig())
+    store = TileStore(folder / TILES, TILE_M, FINEST_M, 1 << 30)
+    count = 0
+    with TrackWriter(folder / TRACK) as track:
+        for scan in cast.scans():
+            mine: list[ImuSample] = []
+            while used < len(samples) and samples[used].stamp_ns <= scan.stamp_ns + SCAN_NS:
+                mine.append(samples[used])
+                used += 1
+            for one in odometry.process(Sweep(scan, tuple(mine))):
+                track.add(one.estimate)
+                store.add(one.cloud, count)
+                count += 1
+    store.close()
+    stamps, position_m, _, _ = cast.truth()
+    np.save(folder / "true_ns.npy", stamps)
+    shutil.rmtree(folder / "walk")
+    np.save(folder / "true_m.npy", position_m)

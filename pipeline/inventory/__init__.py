@@ -1,0 +1,1 @@
+"""Stems, their diameters, heights and crowns, from any map of points."""
