@@ -19,6 +19,7 @@ from edge.validation.clock_truth import ClockReport, clock_reports
 if TYPE_CHECKING:  # heavy: scipy
     from pipeline.evaluation.pair import Pair
 
+WHAT = ("clocks", "trajectory", "trees", "diameters", "alignment", "detection")
 HELP = """compare estimates with ground truth
 
 example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth demo/truth
