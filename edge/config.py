@@ -13,6 +13,7 @@ from edge.errors import ConfigError
 from pipeline.gnss.config import FusionConfig
 from pipeline.grounding.config import GroundingConfig
 from pipeline.odometry.config import OdometryConfig
+from pipeline.refinement.config import RefinementConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -163,6 +164,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fusion: FusionConfig = FusionConfig()
     grounding: GroundingConfig = GroundingConfig()
     products: Products = Products()
+    refinement: RefinementConfig = RefinementConfig()
     detection: Detection = Detection()
     bus: Bus = Bus()
     calibration: str = ""
