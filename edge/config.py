@@ -14,6 +14,7 @@ from pipeline.gnss.config import FusionConfig
 from pipeline.grounding.config import GroundingConfig
 from pipeline.inventory.config import InventoryConfig
 from pipeline.odometry.config import OdometryConfig
+from pipeline.refinement.config import RefinementConfig
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -166,6 +167,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     grounding: GroundingConfig = GroundingConfig()
     inventory: InventoryConfig = InventoryConfig()
     products: Products = Products()
+    refinement: RefinementConfig = RefinementConfig()
     detection: Detection = Detection()
     bus: Bus = Bus()
     calibration: str = ""

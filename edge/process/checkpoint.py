@@ -40,6 +40,10 @@ class Checkpoint:
         """Whether the stage was finished from exactly this, and its outputs are still there."""
         return self._state.stages.get(stage) == key and all(path.exists() for path in outputs)
 
+    def key(self, stage: str) -> str:
+        """Of what a finished stage was made from; empty where it is not finished."""
+        return self._state.stages.get(stage, "")
+
     def begin(self, stage: str) -> Path:
         """An empty folder for the stage's own files."""
         self._state.stages.pop(stage, None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -11,6 +10,7 @@ import numpy.typing as npt
 
 from edge.process import detections_file, trees_file
 from edge.process.detections_file import DetectionFacts
+from edge.process.places import Places
 from edge.process.tree_pictures import read_pictures
 from edge.process.trees_file import PICTURES, GroundingFacts, read_trees
 from pipeline.grounding.evidence import Evidence
@@ -20,11 +20,11 @@ from pipeline.products.findings import Findings, Model, PointEvidence
 from pipeline.products.tiles import Tile
 
 
-def read_findings(work: Path, probable: float) -> Findings:
-    """work: the folder of the stages. probable: trees from there on are findings."""
-    grounding = work / "grounding"
-    detected = msgspec.json.decode((work / "detection" / detections_file.FACTS).read_bytes(), type=DetectionFacts)
-    grounded = read_grounding(work)
+def read_findings(places: Places, probable: float) -> Findings:
+    """probable: trees from there on are findings."""
+    grounding = places.grounding
+    detected = msgspec.json.decode((places.detection / detections_file.FACTS).read_bytes(), type=DetectionFacts)
+    grounded = read_grounding(places)
     trees = [tree for tree in read_trees(grounding / trees_file.TREES) if tree.probability >= probable]
     model = detected.model
     return Findings(
@@ -38,9 +38,9 @@ def read_findings(work: Path, probable: float) -> Findings:
     )
 
 
-def read_grounding(work: Path) -> GroundingFacts:
+def read_grounding(places: Places) -> GroundingFacts:
     """What the grounding says of itself."""
-    return msgspec.json.decode((work / "grounding" / trees_file.FACTS).read_bytes(), type=GroundingFacts)
+    return msgspec.json.decode((places.grounding / trees_file.FACTS).read_bytes(), type=GroundingFacts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

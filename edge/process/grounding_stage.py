@@ -14,6 +14,7 @@ import numpy.typing as npt
 from edge.process import fusion_stage, odometry_stage
 from edge.process.detections_file import DETECTIONS, read_detections
 from edge.process.fusion_stage import read_placement
+from edge.process.places import Places
 from edge.process.trees_file import EVIDENCE, FACTS, SEARCHED, TREES, GroundingFacts, write_trees
 from pipeline.detections import FrameDetections
 from pipeline.grounding.config import GroundingConfig
@@ -33,9 +34,9 @@ POINTS_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class GroundingStage:
-    """work: the folder of the stages. tile_m: of the odometry's tiles."""
+    """tile_m: of the odometry's tiles."""
 
-    work: Path
+    places: Places
     rig: CameraRig
     tile_m: float
     config: GroundingConfig
@@ -44,14 +45,14 @@ class GroundingStage:
         """Write trees and what was searched, in `map` where the session has a place there, else in `odom`; and the
         evidence by point of the odometry's map. Returns the trees."""
         started_s = time.monotonic()
-        model, frames = read_detections(self.work / "detection" / DETECTIONS)
+        model, frames = read_detections(self.places.detection / DETECTIONS)
         target = self.config.target or (model.class_names[0] if model.class_names else "")
-        placement = read_placement(self.work / "fusion" / fusion_stage.PLACEMENT)
+        placement = read_placement(self.places.fusion / fusion_stage.PLACEMENT)
         facts = GroundingFacts(target, "odom" if placement is None else "map")
         if target not in model.class_names:
             known = ", ".join(model.class_names)
             facts.notes += (f"grounding.target {target!r}: the model {model.name} knows {known}; nothing was mapped",)
-        odometry = self.work / "odometry"
+        odometry = self.places.odometry
         tiles = TilePoints(odometry / odometry_stage.TILES, self.tile_m, POINTS_M)
         grounding = Grounding(tiles, msgspec.structs.replace(self.config, target=target))
         where = _Where(read_track(odometry / odometry_stage.TRACK), placement, self.rig)

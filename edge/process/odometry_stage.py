@@ -1,4 +1,4 @@
-"""First stage: every sweep through the odometry. Writes the track, the fixes and the map's tiles."""
+"""First stage: every sweep through the odometry. Writes the track, the fixes, the map's tiles, and its submaps."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from edge.replay.pairing import Pairing, Sweep
 from edge.replay.replay import Replay
 from pipeline.products.tiles import TileStore
 from pipeline.products.track import TrackWriter
+from pipeline.refinement.submaps import SubmapWriter
 
 TRACK, FIXES, TILES, FACTS = "odometry.track", "fixes.msgpack", "tiles", "odometry.json"
+SUBMAPS = "submaps"
 _DEPTH = 4
 """Sweeps decoded ahead: 2 MB."""
 
@@ -44,6 +46,16 @@ class OdometryFacts(msgspec.Struct):
 
 
 @dataclass(frozen=True, slots=True)
+class _Clouds:
+    tiles: TileStore
+    submaps: SubmapWriter
+
+    def close(self) -> None:
+        self.tiles.close()
+        self.submaps.close()
+
+
+@dataclass(frozen=True, slots=True)
 class OdometryStage:
     """Bounded memory: the estimators', the tiles', and a few sweeps."""
 
@@ -55,7 +67,9 @@ class OdometryStage:
     def run(self, folder: Path, advance: Callable[[float], None]) -> OdometryFacts:
         """advance: told the share that is done."""
         facts, started_s = OdometryFacts(), time.monotonic()
-        store = TileStore(folder / TILES, self.products.tile_m, self.products.voxel_m, self.products.memory_mib << 20)
+        products = self.products
+        store = TileStore(folder / TILES, products.tile_m, products.voxel_m, products.memory_mib << 20)
+        kept = _Clouds(store, SubmapWriter(folder / SUBMAPS))
         pairing = Pairing()
         fixes: list[GnssFix] = []
         with TrackWriter(folder / TRACK) as track:
@@ -64,12 +78,12 @@ class OdometryStage:
                     fixes.append(item)
                     continue
                 facts.sweeps += 1
-                if not self._keep(self.odometry.process(item), track, store, facts) and (note := self.odometry.note):
+                if not self._keep(self.odometry.process(item), track, kept, facts) and (note := self.odometry.note):
                     facts.refusals[note] = facts.refusals.get(note, 0) + 1
                 if facts.sweeps % 10 == 0:
                     advance(facts.sweeps / max(self.replay.scans, 1))
-            self._keep(self.odometry.flush(), track, store, facts)
-        store.close()
+            self._keep(self.odometry.flush(), track, kept, facts)
+        kept.close()
         (folder / FIXES).write_bytes(msgspec.msgpack.encode(fixes))
         facts.fixes = len(fixes)
         facts.late_scans, facts.late_samples = pairing.left.scans, pairing.left.samples
@@ -89,12 +103,13 @@ class OdometryStage:
         yield from pairing.flush()
 
     @staticmethod
-    def _keep(found: Iterable[Tracked], track: TrackWriter, store: TileStore, facts: OdometryFacts) -> bool:
+    def _keep(found: Iterable[Tracked], track: TrackWriter, clouds: _Clouds, facts: OdometryFacts) -> bool:
         """Whether there was any."""
         before = facts.estimates
         for one in found:
             track.add(one.estimate)
-            store.add(one.cloud, facts.estimates)
+            clouds.tiles.add(one.cloud, facts.estimates)
+            clouds.submaps.add(one.estimate, one.cloud, facts.estimates)
             facts.estimates += 1
             facts.degenerate += one.estimate.degenerate
         return facts.estimates > before

@@ -17,6 +17,7 @@ from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
 from edge.process.estimators import Estimators, estimators, fusion_config, odometry_config
 from edge.process.fusion_stage import FusionStage
 from edge.process.odometry_stage import OdometryFacts, OdometryStage
+from edge.process.places import Places
 from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
 from edge.process.products_stage import ProductsStage
 from edge.process.watch import Watch
@@ -30,7 +31,7 @@ if TYPE_CHECKING:  # heavy: OpenCV
 STAGES = ("odometry", "fusion", "detection", "grounding", "products")
 ANTENNA = "antenna.json"
 """Where the recording says the antenna is: the fusion does not open it again."""
-_FORMAT = 2
+_FORMAT = 3
 """Of the files between the stages."""
 
 
@@ -112,6 +113,11 @@ class _Work:
         self._stage("products", last, self._products, [self.task.folder / PRODUCTS_JSON])
         return Done(self.task.folder, read_facts(self.task.folder), tuple(self.redone))
 
+    @property
+    def places(self) -> Places:
+        """All under the work folder."""
+        return Places.of(self.checkpoint.folder)
+
     def open_detector(self) -> Detector:
         """As configured. DetectionError."""
         from edge.detection import open_detector  # noqa: PLC0415 - OpenCV, and only where a model is configured
@@ -168,27 +174,36 @@ class _Work:
         DetectionStage(self.task.targets, self.config, self.detector).run(folder, self.watch.advance)
 
     def _grounding(self, folder: Path) -> None:
-        from edge.process.grounding_stage import GroundingStage  # noqa: PLC0415
-        from edge.process.tree_pictures import write_pictures  # noqa: PLC0415
-        from edge.process.trees_file import PICTURES  # noqa: PLC0415
-
-        replay = Replay(self.task.targets, self.config, self.task.replay)
-        calibration = recorded_calibration(replay.facts, self.config.calibration)
-        rig = camera_rig(calibration, replay.static_transforms, self.config.calibration)
-        stage = GroundingStage(self.checkpoint.folder, rig, self.config.products.tile_m, self.config.grounding)
-        trees = stage.run(folder, self.watch.advance)
-        probable = [tree for tree in trees if tree.probability >= self.config.grounding.probable]
-        write_pictures(folder / PICTURES, probable, self.task.targets, self.config)
+        ground(self.task, self.config, self.places, folder, self.watch.advance)
 
     def _products(self, _folder: Path) -> None:
-        software = f"mapforest {__version__}"
-        work, findings = self.checkpoint.folder, None
-        if self.config.detection.model:
-            from edge.process.findings import read_findings  # noqa: PLC0415
+        hand_out(self.task, self.config, self.places, self.task.folder, self.watch.advance)
 
-            findings = read_findings(work, self.config.grounding.probable)
-        stage = ProductsStage(work, self.task.folder, self.config.products, self.task.session, software, findings)
-        stage.run(self.watch.advance)
+
+def ground(task: Task, config: Config, places: Places, folder: Path, advance: Callable[[float], None]) -> None:
+    """Put what the images showed on the map; into `folder`, which `places` has for it."""
+    from edge.process.grounding_stage import GroundingStage  # noqa: PLC0415
+    from edge.process.tree_pictures import write_pictures  # noqa: PLC0415
+    from edge.process.trees_file import PICTURES  # noqa: PLC0415
+
+    replay = Replay(task.targets, config, task.replay)
+    calibration = recorded_calibration(replay.facts, config.calibration)
+    rig = camera_rig(calibration, replay.static_transforms, config.calibration)
+    stage = GroundingStage(places, rig, config.products.tile_m, config.grounding)
+    trees = stage.run(folder, advance)
+    probable = [tree for tree in trees if tree.probability >= config.grounding.probable]
+    write_pictures(folder / PICTURES, probable, task.targets, config)
+
+
+def hand_out(task: Task, config: Config, places: Places, output: Path, advance: Callable[[float], None]) -> None:
+    """Make the products from what the stages left."""
+    findings = None
+    if config.detection.model:
+        from edge.process.findings import read_findings  # noqa: PLC0415
+
+        findings = read_findings(places, config.grounding.probable)
+    software = f"mapforest {__version__}"
+    ProductsStage(places, output, config.products, task.session, software, findings).run(advance)
 
 
 def clean(task: Task) -> None:

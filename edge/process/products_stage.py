@@ -20,6 +20,7 @@ from edge.process.finding_files import PICTURES, keep_verified, write_finding_fi
 from edge.process.findings import read_grounding
 from edge.process.fusion_stage import FusionFacts, read_placement
 from edge.process.odometry_stage import OdometryFacts, read_fixes
+from edge.process.places import Places
 from edge.process.product_facts import PRODUCTS_JSON, REPORT, Georeference, ProductFacts, Shelf, whole
 from edge.process.way_files import Walk, write_way_files
 from pipeline.products.covariance import pose_table
@@ -61,12 +62,12 @@ MADE = (
 
 @dataclass(frozen=True, slots=True)
 class ProductsStage:
-    """work: the folder of the stages. Files go to `output`, each complete or not at all.
+    """Files go to `output`, each complete or not at all.
 
     findings: None when no detector looked at the images; they are handed out also when it found nothing.
     """
 
-    work: Path
+    places: Places
     output: Path
     config: Products
     session: str
@@ -75,11 +76,11 @@ class ProductsStage:
 
     def run(self, advance: Callable[[float], None]) -> ProductFacts:
         """Make everything again."""
-        odometry = self.work / "odometry"
+        odometry = self.places.odometry
         track = read_track(odometry / odometry_stage.TRACK)
-        placement = read_placement(self.work / "fusion" / fusion_stage.PLACEMENT)
+        placement = read_placement(self.places.fusion / fusion_stage.PLACEMENT)
         done = msgspec.json.decode((odometry / odometry_stage.FACTS).read_bytes(), type=OdometryFacts)
-        fused = msgspec.json.decode((self.work / "fusion" / fusion_stage.FACTS).read_bytes(), type=FusionFacts)
+        fused = msgspec.json.decode((self.places.fusion / fusion_stage.FACTS).read_bytes(), type=FusionFacts)
         kept = keep_verified(self.output)
         self._clear()
         walk = self._walk(track, placement, done, read_fixes(odometry / odometry_stage.FIXES))
@@ -147,19 +148,19 @@ class ProductsStage:
         )
 
     def _detections(self, shelf: Shelf) -> None:
-        folder, facts = self.work / "detection", shelf.facts
+        folder, facts = self.places.detection, shelf.facts
         found = msgspec.json.decode((folder / detections_file.FACTS).read_bytes(), type=DetectionFacts)
         model = found.model
         who = f"detector {model.name} (sha256 {model.sha256[:12]}) on {model.device}"
         facts.detection = found
         boxes = f"{who}: {found.boxes} boxes in {found.images} images"
-        facts.notes += (boxes, *found.notes, *read_grounding(self.work).notes)
+        facts.notes += (boxes, *found.notes, *read_grounding(self.places).notes)
         with shelf.put(detections_file.DETECTIONS, "boxes in images, by stamp, as msgpack") as path:
             shutil.copyfile(folder / detections_file.DETECTIONS, path)
 
     def _map(self, shelf: Shelf, walk: Walk, advance: Callable[[float], None]) -> None:
         source = MapSource(
-            self.work / "odometry" / odometry_stage.TILES,
+            self.places.odometry / odometry_stage.TILES,
             self.config.voxel_m,
             walk.poses.stamps_ns,
             walk.poses.horizontal_sigma_m,

@@ -31,6 +31,7 @@ text.label{fill:var(--ink);font-weight:600;paint-order:stroke;stroke:var(--paper
 .wide-table th:first-child,.wide-table td:first-child{text-align:left}
 .dots.t{stroke-width:9}use~.line{stroke-width:2.2}use~.line.s{stroke-width:1.4;stroke-dasharray:5 4}
 .a{stroke:var(--a)}.b,.t{stroke:var(--b)}.c{stroke:var(--c)}.s{stroke:var(--soft)}.band{fill:var(--band)}
+pre{overflow-x:auto;padding:10px 14px;border:1px solid var(--rule);user-select:all}
 ul{color:var(--soft);padding-left:1.2em}
 .verdict{margin:16px 0;padding:10px 14px;border-left:5px solid;font-size:1.15rem}.verdict b{margin-right:.5em}
 .good{color:var(--good)}.warn{color:var(--warn)}.bad{color:var(--bad)}
@@ -97,6 +98,11 @@ def photo(jpeg: bytes, about: str) -> str:
     """For a cell of a table."""
     href = f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"
     return f'<img src="{href}" alt="{escape(about, {chr(34): "&quot;"})}">'
+
+
+def code(plain: str) -> str:
+    """Lines to be copied."""
+    return f"<pre>{escape(plain)}</pre>"
 
 
 def verdict(word: str, tone: str, text: str) -> str:

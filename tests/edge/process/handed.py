@@ -10,6 +10,7 @@ import numpy as np
 from edge.config import Config, Products
 from edge.process import detections_file, trees_file
 from edge.process.detections_file import DetectionFacts, ModelFacts, write_detections
+from edge.process.places import Places
 from edge.process.process import Task, process
 from edge.process.products_stage import ProductsStage
 from edge.process.trees_file import GroundingFacts
@@ -44,5 +45,5 @@ def hand_out(recording, findings, *, gnss=True, **settings):
     done = process(Task([recording], gnss=gnss), Config(), load=fakes())
     config = msgspec.structs.replace(Products(), **settings)
     looked(done.folder / "work", findings)
-    stage = ProductsStage(done.folder / "work", done.folder, config, "walk", "mapforest", findings)
+    stage = ProductsStage(Places.of(done.folder / "work"), done.folder, config, "walk", "mapforest", findings)
     return done.folder, stage.run(lambda _: None)

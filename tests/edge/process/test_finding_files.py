@@ -16,6 +16,7 @@ import rasterio
 
 from edge.config import Products
 from edge.errors import EdgeError
+from edge.process.places import Places
 from edge.process.products_stage import ProductsStage
 from tests.edge.process.handed import found, hand_out
 
@@ -75,7 +76,7 @@ def test_trees_in_another_frame_are_refused(recording, tmp_path):
 
 def test_without_a_detector_there_are_none_of_them_and_old_ones_go(recording, tmp_path):
     folder, _ = hand_out(recording, found(tmp_path / "given"))
-    stage = ProductsStage(folder / "work", folder, Products(), "walk", "mapforest")
+    stage = ProductsStage(Places.of(folder / "work"), folder, Products(), "walk", "mapforest")
     facts = stage.run(lambda _: None)
     assert names(folder) == set(facts.files)
     assert not ON_EARTH & set(facts.files)

@@ -13,6 +13,7 @@ from edge.process.detections_file import DetectionFacts, ModelFacts, write_detec
 from edge.process.findings import read_findings, read_grounding
 from edge.process.fusion_stage import write_placement
 from edge.process.grounding_stage import GroundingStage
+from edge.process.places import Places
 from pipeline.grounding.config import GroundingConfig
 from pipeline.grounding.views import CameraRig
 from pipeline.products.tiles import TileStore, read_tile, tiles
@@ -50,8 +51,8 @@ def work(tmp_path):
 
 
 def run(work, **settings):
-    stage = GroundingStage(work, RIG, TILE_M, GroundingConfig(**settings))
-    return stage.run(work / "grounding", lambda _: None), read_findings(work, 0.5)
+    stage = GroundingStage(Places.of(work), RIG, TILE_M, GroundingConfig(**settings))
+    return stage.run(work / "grounding", lambda _: None), read_findings(Places.of(work), 0.5)
 
 
 def test_trees_are_found_and_what_was_searched_is_told(work):
@@ -100,7 +101,7 @@ def test_a_class_the_model_does_not_know_maps_nothing_and_says_so(work):
     trees, findings = run(work, target="oak")
     assert not trees
     assert not findings.trees
-    assert "knows tree-of-heaven; nothing was mapped" in read_grounding(work).notes[0]
+    assert "knows tree-of-heaven; nothing was mapped" in read_grounding(Places.of(work)).notes[0]
 
 
 def test_images_without_a_pose_or_of_another_lens_are_counted(work):
@@ -109,7 +110,7 @@ def test_images_without_a_pose_or_of_another_lens_are_counted(work):
     lost = [replace(frames[0], stamp_ns=10**12), replace(frames[5], width_px=640, stamp_ns=frames[5].stamp_ns + 1)]
     write_detections(path, MODEL, "/cam", [*frames, *lost])
     run(work)
-    facts = read_grounding(work)
+    facts = read_grounding(Places.of(work))
     assert facts.lost == 3  # and the first, which is before any pose
     assert facts.views == len(frames) - 1
     assert "3 images were left out" in facts.notes[0]

@@ -1,0 +1,1 @@
+"""The refinement beside the live fusion."""

@@ -1,0 +1,166 @@
+"""Closing loops: every candidate registered, and judged for itself. What all of them say together, the graph judges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.estimates import Array
+from pipeline.refinement.candidates import Candidate, candidates, guesses, keys_of
+from pipeline.refinement.closure import Closure
+from pipeline.refinement.config import ClosureConfig
+from pipeline.refinement.constraints import Constraints, Guess, Pair
+from pipeline.refinement.keyframes import Keyframes
+from pipeline.refinement.registration import Cloud, Registered, register
+from pipeline.refinement.solver import Solution
+from pipeline.refinement.submaps import Submap
+
+FORBIDDEN, BY_HAND = "forbidden by the constraints", "accepted by the constraints"
+_CLOUDS = 40
+"""Submaps that wait in memory, 2 MB each."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """On one candidate. closure: what it would say, believed when `reason` is empty or by hand."""
+
+    candidate: Candidate
+    keys: tuple[int, int]
+    reason: str
+    closure: Closure | None = None
+    registered: Registered | None = None
+    correction_m: float = math.nan
+
+    @property
+    def sound(self) -> bool:
+        """Whether it is believed."""
+        return self.closure is not None and self.reason in ("", BY_HAND)
+
+
+class Closing:
+    """The submaps of one session, against its trajectory so far."""
+
+    def __init__(self, submaps: list[Submap], solved: Solution, config: ClosureConfig, asked: Constraints) -> None:
+        self._submaps, self._solved, self._config, self._asked = submaps, solved, config, asked
+        self._keys = keys_of(submaps, solved.frames) if submaps else []
+        self._clouds: dict[int, Cloud] = {}
+
+    def verdicts(self, advance: Callable[[float], None]) -> list[Verdict]:
+        """Of all candidates, the analyst's among them."""
+        solved = self._solved
+        found = list(candidates(self._submaps, solved.frames, solved.poses, solved.covariance, self._config))
+        found += [self._guessed(guess) for guess in self._asked.closure]
+        judged = []
+        for k, candidate in enumerate(found):
+            judged.append(self._judge(candidate))
+            advance((k + 1) / len(found))
+        return judged
+
+    def _judge(self, candidate: Candidate) -> Verdict:
+        keys = (self._keys[candidate.a], self._keys[candidate.b])
+        if self._named(candidate, self._asked.forbid):
+            return Verdict(candidate, keys, FORBIDDEN)
+        expected = (
+            np.linalg.inv(self._pose(keys[0])) @ self._pose(keys[1]) if candidate.guess is None else candidate.guess
+        )
+        around = guesses(expected, candidate.sigma_m)
+        found = register(self._cloud(candidate.a), self._cloud(candidate.b), around, self._config)
+        by_hand = self._named(candidate, self._asked.accept)
+        correction = found.pose @ np.linalg.inv(expected)
+        reason = BY_HAND if by_hand else self._reason(found, keys, candidate)
+        closure = Closure(*keys, found.pose, found.covariance, accepted=by_hand)
+        return Verdict(candidate, keys, reason, closure, found, float(np.linalg.norm(correction[:3, 3])))
+
+    def _reason(self, found: Registered, keys: tuple[int, int], candidate: Candidate) -> str:
+        """Why not; empty when there is none."""
+        config = self._config
+        if found.overlap < config.least_overlap:
+            return f"overlap {found.overlap:.2f}, less than {config.least_overlap:.2f}"
+        if found.weak:
+            return "degenerate: the submaps leave a direction open"
+        if found.rival_m < math.inf:
+            return f"ambiguous: a pose {found.rival_m:.1f} m away fits nearly as well"
+        a, b = (self._solved.frames.rotations[key] for key in keys)
+        tilt = math.degrees(math.acos(min(float((a @ found.pose[:3, :3])[2] @ b[2]), 1.0)))
+        if tilt > config.tilt_deg:
+            return f"tilted by {tilt:.1f} degrees against gravity"
+        if candidate.guess is None:
+            chi2 = self._surprise(found, keys)
+            if chi2 > config.surprise:
+                return f"farther off than the trajectory allows (chi-square {chi2:.0f}, at most {config.surprise:.0f})"
+        return ""
+
+    def _surprise(self, found: Registered, keys: tuple[int, int]) -> float:
+        """Chi-square of four degrees of freedom, place and yaw, by the covariances of both ends, taken as apart."""
+        a, b = (self._pose(key) for key in keys)
+        claimed = a @ found.pose
+        turn = claimed[:3, :3] @ b[:3, :3].T
+        off = np.array([*(claimed[:3, 3] - b[:3, 3]), math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])])
+        covariance, rotations = self._solved.covariance, self._solved.poses.rotations
+        spread = np.sum([_upright(covariance[key], rotations[key]) for key in keys], axis=0)
+        arm = claimed[:3, 3] - a[:3, 3]
+        yaw = _upright(self._solved.covariance[keys[0]], a[:3, :3])[3, 3]
+        spread[:2, :2] += yaw * np.outer([-arm[1], arm[0]], [-arm[1], arm[0]])
+        own = np.kron(np.eye(2), claimed[:3, :3])
+        spread[:3, :3] += (own @ found.covariance @ own.T)[3:, 3:]
+        spread[3, 3] += (own @ found.covariance @ own.T)[2, 2]
+        return float(off @ np.linalg.solve(spread, off))
+
+    def _guessed(self, guess: Guess) -> Candidate:
+        frames = self._solved.frames
+        a, b = (self._submap_at(second) for second in sorted((guess.a_s, guess.b_s)))
+        c, s = math.cos(math.radians(guess.yaw_deg)), math.sin(math.radians(guess.yaw_deg))
+        pose = np.array([[c, -s, 0, guess.x_m], [s, c, 0, guess.y_m], [0, 0, 1, guess.z_m], [0, 0, 0, 1]], float)
+        pose = np.linalg.inv(pose) if guess.a_s > guess.b_s else pose
+        ends = [
+            _relative(frames, key, second)
+            for key, second in zip((self._keys[a], self._keys[b]), sorted((guess.a_s, guess.b_s)), strict=True)
+        ]
+        return Candidate(a, b, 0.0, 1.0, ends[0] @ pose @ np.linalg.inv(ends[1]))
+
+    def _submap_at(self, second: float) -> int:
+        seconds = [abs(self._second(key) - second) for key in self._keys]
+        return int(np.argmin(seconds))
+
+    def _named(self, candidate: Candidate, pairs: Sequence[Pair]) -> bool:
+        ends = {candidate.a, candidate.b}
+        return any({self._submap_at(pair.a_s), self._submap_at(pair.b_s)} == ends for pair in pairs)
+
+    def _second(self, key: int) -> float:
+        stamps = self._solved.frames.stamps_ns
+        return float(stamps[key] - stamps[0]) / 1e9
+
+    def _pose(self, key: int) -> Array:
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = self._solved.poses.rotations[key], self._solved.poses.positions_m[key]
+        return pose
+
+    def _cloud(self, submap: int) -> Cloud:
+        if submap not in self._clouds:
+            if len(self._clouds) >= _CLOUDS:
+                del self._clouds[next(iter(self._clouds))]
+            frames, key = self._solved.frames, self._keys[submap]
+            points = self._submaps[submap].points() - frames.positions_m[key]
+            self._clouds[submap] = Cloud(points @ frames.rotations[key])
+        return self._clouds[submap]
+
+
+def _relative(frames: Keyframes, key: int, second: float) -> Array:
+    """(4, 4) where the carrier was at a time, levelled, as seen from a keyframe."""
+    other = int(frames.nearest(np.array([frames.stamps_ns[0] + round(second * 1e9)]))[0])
+    yaw = math.atan2(frames.rotations[other][1, 0], frames.rotations[other][0, 0])
+    there, here = np.eye(4), np.eye(4)
+    there[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    there[:3, 3] = frames.positions_m[other]
+    here[:3, :3], here[:3, 3] = frames.rotations[key], frames.positions_m[key]
+    return np.asarray(np.linalg.inv(here) @ there)
+
+
+def _upright(covariance: Array, rotation: Array) -> Array:
+    """(4, 4) of position and yaw, from (6, 6)."""
+    to = np.zeros((4, 6))
+    to[:3, :3], to[3, 3:] = np.eye(3), rotation[2]
+    return np.asarray(to @ covariance @ to.T)

@@ -1,0 +1,79 @@
+"""What the refinement assumes. The rows of the benchmark are settings of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0)]
+Kernel = Literal["huber", "cauchy", "geman-mcclure", "tukey", "welsch", "squared"]
+
+
+class ChainConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Keyframes, and how far the odometry is believed from one to the next."""
+
+    keyframe_m: Positive = 2.0
+    keyframe_turn_deg: Positive = 45.0
+    drift_scales: tuple[Positive, ...] = (1.0, 2.0, 4.0, 8.0)
+    """By which the drift that the odometry tells of is multiplied; the one that explains the fixes best is taken."""
+    floor_m: Positive = 0.01
+    """Drift after one metre that is taken at least, growing with the root of the way; `floor_yaw_deg` likewise."""
+    floor_yaw_deg: Positive = 0.005
+    level_deg: Positive = 0.1
+    """How well gravity tells roll and pitch at each keyframe."""
+
+
+class GnssConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Fixes as factors. Antenna, floors, spacing and duration of errors are those of `[fusion]`."""
+
+    kernel: Kernel = "huber"
+    width: Positive = 1.0
+    """Of the kernel, in units of the one that keeps 95 % of the efficiency: 1.345 sigmas of Huber's."""
+    gate: NotNegative = 13.8
+    """Chi-square of a horizontal residual from which on a fix is left out; vertically 0.78 of it; 0: no gate."""
+    learn: bool = True
+    """Sigmas of a kind of fix are widened until their residuals are what they should be."""
+    rounds: Annotated[int, msgspec.Meta(ge=1, le=20)] = 6
+    """Of judging the fixes by the trajectory and the trajectory by the fixes, at most."""
+
+
+class ClosureConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Places that were passed twice."""
+
+    enabled: bool = True
+    apart_m: Positive = 30.0
+    """Of way between two submaps: closer ones the odometry has in one map anyway."""
+    reach_m: Positive = 12.0
+    """Submaps whose middles are closer than this see the same trees; uncertainty is added."""
+    most_m: Positive = 30.0
+    """Candidates farther apart than that are not looked at, however uncertain the way."""
+    each: Annotated[int, msgspec.Meta(ge=1)] = 3
+    """Candidates a submap, the nearest ones."""
+    inlier_m: Positive = 0.35
+    """A point that has another one so close in the other submap is met."""
+    least_overlap: Positive = 0.5
+    """Share of a submap's points that must be met."""
+    rival_m: Positive = 0.6
+    """A second pose farther than this from the first, and nearly as good, makes a place ambiguous."""
+    rival_share: Positive = 0.93
+    """Of the first one's overlap."""
+    tilt_deg: Positive = 2.0
+    """Gravity tells roll and pitch: a registration that tilts by more is wrong."""
+    surprise: Positive = 16.8
+    """Chi-square (99 % of six degrees of freedom) up to which a correction is what the trajectory allows."""
+    sigma_m: Positive = 0.03
+    sigma_deg: Positive = 0.15
+    """Of a good registration; along a direction that the submaps hardly show, more."""
+    weak_m: Positive = 0.10
+    weak_deg: Positive = 0.5
+    """A registration less certain than that along any direction is degenerate."""
+
+
+class RefinementConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All of it."""
+
+    chain: ChainConfig = ChainConfig()
+    gnss: GnssConfig = GnssConfig()
+    closures: ClosureConfig = ClosureConfig()

@@ -1,0 +1,117 @@
+"""The odometry's track as a chain: some of its poses, and how well each is known from the one before."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.estimates import Array
+from pipeline.refinement.config import ChainConfig
+from pipeline.refinement.errors import NothingToRefine
+
+_LEAST_STEP_M = 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keyframes:
+    """m of a track's n poses, `base_link` in `odom`.
+
+    index: (m,) into the track. stamps_ns: (m,). positions_m: (m, 3). rotations: (m, 3, 3). travelled_m: (m,).
+    drifted: (m - 1, 4) variance of yaw (rad^2), x, y, z (m^2, `odom`) that the odometry gathered on each step.
+    """
+
+    index: npt.NDArray[np.int64]
+    stamps_ns: npt.NDArray[np.int64]
+    positions_m: Array
+    rotations: Array
+    travelled_m: Array
+    drifted: Array
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def step_covariances(self, level_rad: float) -> Array:
+        """(m - 1, 6, 6) of each pose as seen from the one before: rotation (rad), then position (m), both in the body's
+        axes of the later one. Roll and pitch do not drift: gravity holds them by `level_rad`."""
+        turns = self.rotations[1:]
+        up = turns[:, 2, :, None] * turns[:, 2, None, :]
+        steps = np.zeros((len(turns), 6, 6))
+        steps[:, :3, :3] = self.drifted[:, 0, None, None] * up + level_rad**2 * (np.eye(3) - up)
+        steps[:, 3:, 3:] = np.einsum("kji,kj,kjl->kil", turns, self.drifted[:, 1:], turns)
+        return steps
+
+    def drifting(self, scale: float) -> Keyframes:
+        """The same, with the drift's sigmas so many times larger."""
+        return replace(self, drifted=self.drifted * scale**2)
+
+    def nearest(self, stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """(k,) the keyframe nearest in time to each stamp (k,)."""
+        after = np.clip(np.searchsorted(self.stamps_ns, stamps_ns), 1, max(len(self) - 1, 1))
+        before = after - 1
+        after = np.minimum(after, len(self) - 1)
+        late = stamps_ns - self.stamps_ns[before] > self.stamps_ns[after] - stamps_ns
+        return np.where(late, after, before)
+
+
+def keyframes(track: npt.NDArray[np.void], config: ChainConfig) -> Keyframes:
+    """Of a track (n,) of ESTIMATE. NothingToRefine where there are fewer than two."""
+    index = _chosen(track, config)
+    if len(index) < 2:
+        raise NothingToRefine(f"a track of {len(track)} poses that does not move cannot be refined")
+    chosen = track[index]
+    return Keyframes(
+        index,
+        chosen["stamp_ns"].astype(np.int64),
+        chosen["position_m"],
+        chosen["rotation"],
+        chosen["travelled_m"],
+        _drifted(chosen, config),
+    )
+
+
+def _chosen(track: npt.NDArray[np.void], config: ChainConfig) -> npt.NDArray[np.int64]:
+    """The first, the last, and one whenever the carrier has moved or turned enough."""
+    if not len(track):
+        return np.empty(0, np.int64)
+    found = [0]
+    positions, rotations = track["position_m"], track["rotation"]
+    cosine = 1.0 + 2.0 * math.cos(math.radians(config.keyframe_turn_deg))
+    for k in range(1, len(track)):
+        last = found[-1]
+        moved = positions[k] - positions[last]
+        turned = float(np.vdot(rotations[last], rotations[k])) < cosine  # the trace of the rotation in between
+        if float(moved @ moved) > config.keyframe_m**2 or turned:
+            found.append(k)
+    if found[-1] != len(track) - 1:
+        found.append(len(track) - 1)
+    return np.array(found, np.int64)
+
+
+def _drifted(chosen: npt.NDArray[np.void], config: ChainConfig) -> Array:
+    """By how much the odometry's own covariance grew, and no less than the floors.
+
+    The covariance is of the whole way since the start. What an error of yaw at the start of a step swings its end by is
+    not new, so that it is taken off.
+    """
+    drifted = np.empty((len(chosen) - 1, 4))
+    floor = np.array([math.radians(config.floor_yaw_deg), *[config.floor_m] * 3]) ** 2
+    known = [_level_covariance(record) for record in chosen]
+    for k, (before, after) in enumerate(itertools.pairwise(chosen)):
+        moved = after["position_m"] - before["position_m"]
+        carry = np.eye(4)
+        carry[1, 0], carry[2, 0] = -moved[1], moved[0]
+        grown = np.diag(known[k + 1] - carry @ known[k] @ carry.T)
+        drifted[k] = np.maximum(grown, floor * max(float(np.linalg.norm(moved)), _LEAST_STEP_M))
+    return drifted
+
+
+def _level_covariance(record: np.void) -> Array:
+    """(4, 4) of yaw about the vertical, and of position, in `odom`."""
+    to_level = np.zeros((4, 6))
+    to_level[0, 3:] = record["rotation"][2]
+    to_level[1:, :3] = np.eye(3)
+    return np.asarray(to_level @ record["covariance"] @ to_level.T)

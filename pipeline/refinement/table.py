@@ -1,0 +1,32 @@
+"""Every candidate of a closure, as a line: what was measured, and why it was believed or not."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from pipeline.refinement.refine import Refined
+
+HEADER = ("a_s", "b_s", "believed", "reason", "apart_m", "sigma_m", "overlap", "rival_m", "correction_m")
+
+
+def write_closures(path: Path, found: Refined) -> None:
+    """CSV."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(HEADER)
+        writer.writerows(rows(found))
+
+
+def rows(found: Refined) -> Iterator[tuple[str, ...]]:
+    """In the order of `HEADER`; empty where nothing was measured."""
+    stamps = found.solution.frames.stamps_ns
+    for one in found.verdicts:
+        seconds = [f"{(stamps[key] - stamps[0]) / 1e9:.1f}" for key in one.keys]
+        measured = one.registered
+        numbers = [one.candidate.apart_m, one.candidate.sigma_m]
+        numbers += [measured.overlap, measured.rival_m, one.correction_m] if measured is not None else [math.nan] * 3
+        cells = [f"{number:.3f}" if math.isfinite(number) else "" for number in numbers]
+        yield (*seconds, "yes" if one.sound else "no", one.reason, *cells)
