@@ -11,8 +11,7 @@ import numpy as np
 from pipeline.estimates import Array
 from pipeline.products.covariance import horizontal_sigma_m
 from pipeline.refinement.config import ClosureConfig
-from pipeline.refinement.graph import Poses
-from pipeline.refinement.keyframes import Keyframes
+from pipeline.refinement.keyframes import Keyframes, Poses
 from pipeline.refinement.submaps import Submap
 
 _SURE = 2.0

@@ -6,7 +6,6 @@ Poses are keyed by their number. GTSAM's order of a pose's six is rotation, then
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from pipeline.refinement.closure import Closure
 from pipeline.refinement.config import GnssConfig
 from pipeline.refinement.fixes import Fixes, Judged
 from pipeline.refinement.gnss_factors import add_fixes, insert_points
-from pipeline.refinement.keyframes import Keyframes
+from pipeline.refinement.keyframes import Keyframes, Poses
 from pipeline.refinement.library import gtsam
 from pipeline.refinement.pins import Pinned
 
@@ -24,14 +23,6 @@ _LOOSE = (0.5, 100.0)
 _TIGHT = (1e-4, 1e-3)
 _PROBABILITY = 0.99
 """A true closure is believed with."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Poses:
-    """m keyframes in `map`. positions_m: (m, 3). rotations: (m, 3, 3)."""
-
-    positions_m: Array
-    rotations: Array
 
 
 class Graph:

@@ -57,6 +57,14 @@ class Keyframes:
         return np.where(late, after, before)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """m keyframes in `map`. positions_m: (m, 3). rotations: (m, 3, 3)."""
+
+    positions_m: Array
+    rotations: Array
+
+
 def keyframes(track: npt.NDArray[np.void], config: ChainConfig) -> Keyframes:
     """Of a track (n,) of ESTIMATE. NothingToRefine where there are fewer than two."""
     index = _chosen(track, config)

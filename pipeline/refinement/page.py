@@ -17,6 +17,9 @@ from pipeline.refinement.table import HEADER, rows
 
 _OFFERED = 12
 """Stretches of GNSS that a line is offered for."""
+_AROUND_S = 0.5
+"""Added to both ends of a stretch."""
+_ROUNDING_S = 0.1
 _TOGETHER_S = 5.0
 """Fixes rejected within this time are one stretch."""
 
@@ -108,7 +111,8 @@ def _lines(found: Refined) -> Iterator[str]:
         if one.registered is not None:
             yield f"[[{word}]]  # {why}\na_s = {row[0]}\nb_s = {row[1]}\n"
     for from_s, to_s, count in [*rejected_stretches(found)][:_OFFERED]:
-        yield f"[[drop_gnss]]  # {count} fixes are left out\nfrom_s = {from_s:.1f}\nto_s = {to_s:.1f}\n"
+        begin, end = max(from_s - _AROUND_S, 0.0), min(to_s + _AROUND_S, found.problem.duration_s - _ROUNDING_S)
+        yield f"[[drop_gnss]]  # {count} fixes are left out\nfrom_s = {begin:.1f}\nto_s = {end:.1f}\n"
 
 
 def _across(positions_m: Array, verdicts: list[Verdict]) -> tuple[Array, Array]:

@@ -19,8 +19,8 @@ from pipeline.refinement.config import RefinementConfig
 from pipeline.refinement.constraints import Constraints
 from pipeline.refinement.fixes import Fixes, Judged, judge, place_fixes
 from pipeline.refinement.gnss_factors import kernel_weights, log_norm
-from pipeline.refinement.graph import Graph, Poses, antennas_m
-from pipeline.refinement.keyframes import Keyframes, keyframes
+from pipeline.refinement.graph import Graph, antennas_m
+from pipeline.refinement.keyframes import Keyframes, Poses, keyframes
 from pipeline.refinement.pins import place_pins
 
 _BELIEVED = 0.5
