@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from pipeline.grounding.ground_kernels import lowest
+
 Array = npt.NDArray[np.float64]
 CELL_M = 1.0
 RANK = 2
@@ -27,16 +29,10 @@ class Ground:
     @classmethod
     def under(cls, points_m: Array) -> Ground:
         """Of points (n, 3), n > 0."""
-        origin = np.floor(points_m[:, :2].min(axis=0) / CELL_M) * CELL_M
-        index = ((points_m[:, :2] - origin) / CELL_M).astype(np.int64)
-        shape = index.max(axis=0) + 1
-        cells = index[:, 0] * shape[1] + index[:, 1]
-        order = np.lexsort((points_m[:, 2], cells))
-        found, first, count = np.unique(cells[order], return_index=True, return_counts=True)
-        lowest = points_m[order[first + np.minimum(RANK, count - 1)], 2]
-        height = np.full(int(shape[0] * shape[1]), np.nan)
-        height[found] = lowest
-        return cls(origin, _opened(height.reshape(shape)))
+        origin = np.floor(points_m.min(axis=0)[:2] / CELL_M) * CELL_M
+        rows, columns = (np.floor((points_m.max(axis=0)[:2] - origin) / CELL_M).astype(int) + 1).tolist()
+        height = lowest(np.ascontiguousarray(points_m, np.float64), origin, CELL_M, rows, columns, RANK)
+        return cls(origin, _opened(height))
 
     def at(self, xy_m: Array) -> Array:
         """(n,) height of the ground under (n, 2); beyond the grid, that of its rim."""

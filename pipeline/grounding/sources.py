@@ -61,4 +61,5 @@ class RollingPoints:
 
 
 def _within(points_m: Array, place_m: Array, radius_m: float) -> Array:
-    return np.asarray(points_m[((points_m - place_m) ** 2).sum(axis=1) < radius_m**2])
+    away = points_m - place_m
+    return np.asarray(points_m[np.einsum("ni,ni->n", away, away) < radius_m**2])

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from pipeline.grounding.ground import Ground
+from pipeline.grounding.ground_kernels import lowest
 from pipeline.grounding.stems import find_stems
 from pipeline.grounding.surroundings import Neighbourhood, Surroundings
 from tests.pipeline.grounding.grove import Grove, Trunk
@@ -27,6 +28,17 @@ def test_the_ground_under_a_slope_with_brush_is_the_slope():
     error = Ground.under(points).at(asked) - slope(asked)
     assert abs(np.median(error)) < 0.25
     assert np.abs(error).max() < 0.6
+
+
+def test_the_lowest_of_a_cell_are_those_that_sorting_finds():
+    points = RANDOM.uniform([-3, 5, -1], [2, 9, 4], (400, 3))
+    found = lowest(points, np.array([-3.0, 5.0]), 1.0, 5, 4, 2)
+    for i in range(5):
+        for j in range(4):
+            inside = (np.floor(points[:, 0]) + 3 == i) & (np.floor(points[:, 1]) - 5 == j)
+            assert found[i, j] == np.sort(points[inside, 2])[2]
+    few = lowest(points[:2] * 0 + [[-2.5, 5.5, 3.0], [-2.5, 5.5, 1.0]], np.array([-3.0, 5.0]), 1.0, 1, 2, 2)
+    np.testing.assert_array_equal(few, [[3.0, np.nan]])
 
 
 def test_where_only_a_crown_was_seen_the_ground_is_that_of_the_neighbours():
