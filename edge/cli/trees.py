@@ -13,7 +13,7 @@ from pipeline.evaluation.trees import TreeErrors
 
 def show(out: Console, found: ComparedTrees) -> None:
     """A row for the map as it is handed out, one with the error of the trajectory taken off."""
-    title = f"trees: of those within {WITHIN_M:.0f} m of the way and seen for {SEEN_S:.0f} s; their places in plan"
+    title = f"trees within {WITHIN_M:.0f} m of the way that were seen for {SEEN_S:.0f} s; places in plan"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     columns = ("found", "recall", "right", "precision", "median m", "worst m", "in 95%")
     for column in ("", *columns):
