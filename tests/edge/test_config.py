@@ -141,7 +141,7 @@ def test_the_sample_file_says_every_key_and_every_default() -> None:
     assert keys(raw) == known - {"sensors"}
 
 
-ESTIMATORS = ("odometry", "fusion", "grounding", "inventory")
+ESTIMATORS = ("odometry", "fusion", "grounding", "refinement", "inventory")
 
 
 @pytest.mark.usefixtures("real_drivers")

@@ -45,8 +45,10 @@ def test_points_and_inertial_samples_keep_their_relative_time():
     nearest = np.abs(scan.stamp_ns + scan.offset_ns.astype(np.int64) - sample.stamp_ns).argmin()
     by_stamps = scan.stamp_ns + int(scan.offset_ns[nearest]) - sample.stamp_ns
     point_s = (round(float(scan.xyz_m[nearest, 0]) * 1000) - 1) * 5e-6
-    by_walk = (point_s - sample.angular_velocity[2] + 0.05) % 0.1 - 0.05
-    assert by_stamps / 1e9 == pytest.approx(by_walk, abs=20e-6)
+    by_walk = point_s - sample.angular_velocity[2]
+    # The slots tell the time within a tenth of a second only; on a busy machine the nearest sample is farther off.
+    apart_s = (by_stamps / 1e9 - by_walk + 0.05) % 0.1 - 0.05
+    assert apart_s == pytest.approx(0.0, abs=20e-6)
 
 
 def test_finds_the_lidar_by_discovery_and_by_its_push():
