@@ -48,9 +48,11 @@ class Run:
 def process(source: Path, output: Path, options: Sequence[str] = (), every_s: float = 1.0) -> Run:
     """Everything anew, in a process of its own."""
     command = [sys.executable, "-m", "edge.cli.main", "process", str(source), "--output", str(output), "--fresh"]
+    state = output / "work" / "state.json"
+    state.unlink(missing_ok=True)  # of an earlier run, whose stages are not those of this one
     begun_s = time.monotonic()
     running = subprocess.Popen([*command, *options, "--json"], stdout=subprocess.PIPE, text=True)
-    samples = list(_watched(running, output / "work" / "state.json", every_s))
+    samples = list(_watched(running, state, every_s))
     text, _ = running.communicate()
     return Run(time.monotonic() - begun_s, samples, msgspec.json.decode(text))
 

@@ -29,8 +29,8 @@ class TilePoints:
         """(n, 3) points within a radius of a place (3,)."""
         low, high = (np.floor((place_m[:2] + side * radius_m) / self._tile_m).astype(int).tolist() for side in (-1, 1))
         wanted = [(i, j) for i in range(low[0], high[0] + 1) for j in range(low[1], high[1] + 1)]
-        parts = [self._tile(tile) for tile in wanted if tile in self._there]
-        return _within(np.concatenate(parts), place_m, radius_m) if parts else np.empty((0, 3))
+        parts = [_within(self._tile(tile), place_m, radius_m) for tile in wanted if tile in self._there]
+        return np.concatenate(parts) if parts else np.empty((0, 3))
 
     def _tile(self, tile: Tile) -> Array:
         if tile not in self._held:

@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.grounding.evidence import Evidence
+from pipeline.grounding.ground import Ground
 from pipeline.grounding.hypotheses import Hypothesis
 from pipeline.grounding.likelihood import probability
-from pipeline.grounding.surroundings import PointSource, Surroundings
+from pipeline.grounding.surroundings import PointSource
 from pipeline.trees import Tree
 
 Array = npt.NDArray[np.float64]
@@ -31,11 +32,13 @@ def tree_of(one: Hypothesis, number: int, class_name: str, source: PointSource, 
         covariance = covariance + NEAR_SIDE_M**2 * np.eye(2)
     place = np.array([*one.mean_m, one.height_m])
     near = source.around(place, AROUND_M)
-    around = Surroundings.of(place, near) if len(near) else None
     base_m, points, height_m, crown_m = one.height_m, 0, np.nan, np.nan
-    if around is not None:
-        base_m = float(around.ground.at(one.mean_m[None])[0])
-        points, height_m, crown_m = _extent(around, one.mean_m, evidence)
+    if len(near):
+        near = near[((near[:, :2] - one.mean_m) ** 2).sum(axis=1) < CROWN_M**2]
+    if len(near):
+        ground = Ground.under(near)
+        base_m = float(ground.at(one.mean_m[None])[0])
+        points, height_m, crown_m = _extent(near, ground, one.mean_m, evidence)
     whole = np.zeros((3, 3))
     whole[:2, :2], whole[2, 2] = covariance, BASE_SIGMA_M**2
     return Tree(
@@ -57,13 +60,13 @@ def tree_of(one: Hypothesis, number: int, class_name: str, source: PointSource, 
     )
 
 
-def _extent(around: Surroundings, place_m: Array, evidence: Evidence | None) -> tuple[int, float, float]:
-    """Points that carry the label near a place, how high they reach, and how wide."""
+def _extent(near_m: Array, ground: Ground, place_m: Array, evidence: Evidence | None) -> tuple[int, float, float]:
+    """Points that carry the label, of those near a place, how high they reach, and how wide."""
     if evidence is None:
         return 0, np.nan, np.nan
-    index = around.near(place_m, CROWN_M)
-    labelled = index[evidence.at(around.points_m[index]).log_odds > 0.0]
+    labelled = near_m[evidence.at(near_m).log_odds > 0.0]
     if len(labelled) < LEAST_POINTS:
         return len(labelled), np.nan, np.nan
-    away = np.linalg.norm(around.points_m[labelled, :2] - place_m, axis=1)
-    return len(labelled), float(np.percentile(around.height_m[labelled], 99)), 2.0 * float(np.percentile(away, 80))
+    away = np.linalg.norm(labelled[:, :2] - place_m, axis=1)
+    height = labelled[:, 2] - ground.at(labelled[:, :2])
+    return len(labelled), float(np.percentile(height, 99)), 2.0 * float(np.percentile(away, 80))

@@ -39,11 +39,6 @@ class Surroundings:
         height = points_m[:, 2] - ground.at(points_m[:, :2])
         return cls(centre_m, points_m, height, ground, tuple(find_stems(points_m, height)))
 
-    def near(self, place_m: Array, radius_m: float) -> npt.NDArray[np.intp]:
-        """Indices of the points within a horizontal radius of (2,)."""
-        away = self.points_m[:, :2] - place_m
-        return np.flatnonzero((away**2).sum(axis=1) < radius_m**2)
-
 
 class Neighbourhood:
     """Keeps the surroundings of the last place until the camera has moved on by `RENEWED_M`."""
