@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pyproj
 
-from pipeline.alignment import ply
+from pipeline import ply
 from pipeline.alignment.errors import CloudError
 from pipeline.alignment.grid import Array
 
@@ -64,7 +64,7 @@ def inspect(path: Path) -> Cloud:
 def batches(cloud: Cloud, at_once: int = AT_ONCE) -> Iterator[Batch]:
     """All points, in the units and the frame of the file, without what is classified as noise."""
     if cloud.path.suffix.lower() == ".ply":
-        for xyz in ply.batches(cloud.path, at_once):
+        for xyz in _ply(cloud.path, at_once):
             zeros = np.zeros(len(xyz))
             yield Batch(xyz, zeros.astype(np.uint8), zeros.astype(np.uint16), zeros)
         return
@@ -80,12 +80,19 @@ def batches(cloud: Cloud, at_once: int = AT_ONCE) -> Iterator[Batch]:
 
 def _inspect_ply(path: Path) -> Cloud:
     count, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
-    for xyz in ply.batches(path, AT_ONCE):
+    for xyz in _ply(path, AT_ONCE):
         count += len(xyz)
         low, high = np.minimum(low, xyz.min(axis=0)), np.maximum(high, xyz.max(axis=0))
     if count == 0:
         raise CloudError(f"{path}: holds no points")
     return Cloud(path, count, low, high, None)
+
+
+def _ply(path: Path, at_once: int) -> Iterator[Array]:
+    try:
+        yield from ply.batches(path, at_once)
+    except ply.PlyError as error:
+        raise CloudError(str(error)) from error
 
 
 def _crs(header: laspy.LasHeader) -> pyproj.CRS | None:
