@@ -24,6 +24,21 @@ def _entropy(counts: Array, total: float) -> float:
     return found
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _interpolated(field: Array, known: npt.NDArray[np.bool_], x: float, y: float) -> float:
+    """Between the four cells around, NaN where one of them is not known."""
+    ix, iy = math.floor(x), math.floor(y)
+    if ix < 0 or iy < 0 or ix + 1 >= field.shape[0] or iy + 1 >= field.shape[1]:
+        return math.nan
+    if not (known[ix, iy] and known[ix + 1, iy] and known[ix, iy + 1] and known[ix + 1, iy + 1]):
+        return math.nan
+    fx, fy = x - ix, y - iy
+    near = (1.0 - fy) * field[ix, iy] + fy * field[ix, iy + 1]
+    far = (1.0 - fy) * field[ix + 1, iy] + fy * field[ix + 1, iy + 1]
+    value: float = (1.0 - fx) * near + fx * far
+    return value
+
+
 @njit(cache=True, nogil=True, parallel=True)
 def pose_information(
     xy: Array, levels: npt.NDArray[np.int64], field: Array, known: npt.NDArray[np.bool_], poses: Array, bins: int
@@ -42,14 +57,9 @@ def pose_information(
         for i in range(len(xy)):
             x = c * xy[i, 0] - s * xy[i, 1] + poses[k, 0]
             y = s * xy[i, 0] + c * xy[i, 1] + poses[k, 1]
-            ix, iy = math.floor(x), math.floor(y)
-            if ix < 0 or iy < 0 or ix + 1 >= field.shape[0] or iy + 1 >= field.shape[1]:
+            value = _interpolated(field, known, x, y)
+            if math.isnan(value):
                 continue
-            if not (known[ix, iy] and known[ix + 1, iy] and known[ix, iy + 1] and known[ix + 1, iy + 1]):
-                continue
-            fx, fy = x - ix, y - iy
-            value = (1.0 - fx) * ((1.0 - fy) * field[ix, iy] + fy * field[ix, iy + 1])
-            value += fx * ((1.0 - fy) * field[ix + 1, iy] + fy * field[ix + 1, iy + 1])
             value *= bins - 1
             low = min(int(value), bins - 2)
             share = value - low
@@ -85,14 +95,9 @@ def pose_sums(xy: Array, values: Array, field: Array, known: npt.NDArray[np.bool
         for i in range(len(xy)):
             x = c * xy[i, 0] - s * xy[i, 1] + poses[k, 0]
             y = s * xy[i, 0] + c * xy[i, 1] + poses[k, 1]
-            ix, iy = math.floor(x), math.floor(y)
-            if ix < 0 or iy < 0 or ix + 1 >= field.shape[0] or iy + 1 >= field.shape[1]:
+            a = _interpolated(field, known, x, y)
+            if math.isnan(a):
                 continue
-            if not (known[ix, iy] and known[ix + 1, iy] and known[ix, iy + 1] and known[ix + 1, iy + 1]):
-                continue
-            fx, fy = x - ix, y - iy
-            a = (1.0 - fx) * ((1.0 - fy) * field[ix, iy] + fy * field[ix, iy + 1])
-            a += fx * ((1.0 - fy) * field[ix + 1, iy] + fy * field[ix + 1, iy + 1])
             b = values[i]
             n += 1.0
             sa += a

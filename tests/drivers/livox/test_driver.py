@@ -122,10 +122,9 @@ def test_clock_step_is_an_event_and_no_loss(step_s):
     (event,) = [text for text in rig.events if "jumped" in text]
     assert float(event.split()[-2]) == pytest.approx(step_s, abs=0.4)
     assert [stream.lost for stream in health.streams] == [0, 0]
-    # Stamps stay those of the host; right after the step they lean on few packets, which a busy machine delays.
-    for scan in rig.scans[-4:]:
-        assert 0 < scan.receive_ns - scan.stamp_ns < 0.2e9
-    for sample in rig.samples[-80:]:
+    for scan in rig.scans:
+        assert 0 < scan.receive_ns - scan.stamp_ns < 0.2e9  # stamps stay those of the host
+    for sample in rig.samples:
         assert abs(sample.receive_ns - sample.stamp_ns) < 0.05e9
 
 
