@@ -135,7 +135,7 @@ class LivePipeline:
             dropped=governor.dropped,
             thinned=governor.share,
             age_s=age_s,
-            note=self._odometry.note or estimate.note,
+            note=self._odometry.note or estimate.note or self._fusion.note,
         )
 
     def _take(self, envelope: Envelope) -> None:

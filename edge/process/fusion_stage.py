@@ -22,12 +22,13 @@ _FIT_SHARE = 0.3
 
 
 class FusionFacts(msgspec.Struct):
-    """georeferenced: whether there is a `map` at all; why not, otherwise."""
+    """georeferenced: whether there is a `map` at all; why not, otherwise. notes: what is wrong with the fixes."""
 
     georeferenced: bool = False
     why: str = ""
     fixes: int = 0
     datum: tuple[float, float, float] | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ class FusionStage:
                 advance(_FIT_SHARE + (1.0 - _FIT_SHARE) * i / count)
         datum = (drift.datum.latitude_deg, drift.datum.longitude_deg, drift.datum.height_m)
         write_placement(folder / PLACEMENT, Placement(datum, translation, yaw, covariance))
-        facts.georeferenced, facts.datum = True, datum
+        facts.georeferenced, facts.datum, facts.notes = True, datum, drift.notes
         return facts
 
 

@@ -127,6 +127,7 @@ class ProductsStage:
             notes.append(f"{done.late_scans} sweeps and {done.late_samples} inertial samples came too late, left out")
         if site is None:
             notes.append(f"not georeferenced: {fused.why}; positions are metres from the start, heading arbitrary")
+        notes += fused.notes
         said = Counter(note.decode(errors="replace") for note in walk.track["note"] if note)
         notes += [f"{count} sweeps: {note}" for note, count in said.most_common(20)]
         return ProductFacts(

@@ -14,7 +14,7 @@ from pipeline.gnss.belief import Belief
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.history import Passage
 from pipeline.gnss.sighting import Sighting
-from pipeline.gnss.tracker import Tracker
+from pipeline.gnss.tracker import Dispute, Tracker
 from pipeline.gnss.trust import Trust
 
 MEMORY = 0.995
@@ -35,6 +35,11 @@ class Bank:
         self._trackers = trackers(alignment, first, config)
         self._evidence = np.zeros(len(self._trackers))
         self._mix()
+
+    @property
+    def disputes(self) -> list[Dispute]:
+        """Of the likeliest tracker."""
+        return self._trackers[int(np.argmax(self._evidence))].disputes
 
     def follow(self, sighting: Sighting) -> bool:
         """Whether the likeliest tracker used it."""

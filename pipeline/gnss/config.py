@@ -16,6 +16,8 @@ class FusionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     antenna_m: tuple[float, float, float] = (-0.05, 0.0, 0.20)
     """In `base_link`."""
 
+    stamped_late_s: float = 0.0
+    """By how much the stamps of the fixes are too late; the fusion says so where it can tell."""
     drift_m: NotNegative = 0.05
     """Horizontal drift of the odometry after one metre; it grows with the root of the way: 0.5 m after 100 m."""
     drift_up_m: NotNegative = 0.05

@@ -12,10 +12,14 @@ from pipeline.gnss.bank import Bank
 from pipeline.gnss.belief import YAW, turned
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.history import History
-from pipeline.gnss.sighting import Sighting, Sightings
+from pipeline.gnss.lateness import Lateness, lateness
+from pipeline.gnss.sighting import Sighting, Sightings, measured_ns
 from pipeline.gnss.yaw_search import YawSearch
 
 MOST_WAITING = 100
+LOOKED_AT = 1200
+"""Sightings, when their lateness is looked for: 20 minutes."""
+LOOK_EVERY = 60
 UNKNOWN_YAW = np.pi
 """One sigma, rad."""
 
@@ -32,12 +36,16 @@ class GnssFusion:
         self._bank: Bank | None = None
         self._used = 0
         self._gated = 0
+        self._seen: deque[Sighting] = deque(maxlen=LOOKED_AT)
+        self._unlooked = 0
+        self._lateness: Lateness | None = None
 
     def add_odometry(self, estimate: OdometryEstimate) -> None:
         """In order of time. Where its way begins anew, so does the search for the yaw; the datum stays."""
         if not self._history.add(estimate):
             self._search, self._bank = YawSearch(self.config), None
-        due = [fix for fix in self._waiting if fix.stamp_ns <= estimate.stamp_ns]
+            self._seen.clear()
+        due = [fix for fix in self._waiting if measured_ns(fix, self.config) <= estimate.stamp_ns]
         for fix in due:
             self._waiting.remove(fix)
             self._place(fix)
@@ -45,10 +53,16 @@ class GnssFusion:
     def add_fix(self, fix: GnssFix) -> None:
         """Any fix, whenever it comes: it is compared with the odometry at its own stamp."""
         newest_ns = self._history.newest_ns
-        if newest_ns is not None and fix.stamp_ns <= newest_ns:
+        if newest_ns is not None and measured_ns(fix, self.config) <= newest_ns:
             self._place(fix)
         else:
             self._waiting.append(fix)
+
+    @property
+    def note(self) -> str:
+        """What the operator should know of the receiver; empty where nothing is wrong."""
+        disputes = self._bank.disputes if self._bank is not None else []
+        return "; ".join(map(str, ([self._lateness] if self._lateness is not None else []) + disputes[-1:]))
 
     def state(self) -> MapToOdom | None:
         """None before the first fix in this `odom`."""
@@ -90,6 +104,16 @@ class GnssFusion:
             used = self._take(sighting)
             self._used += used
             self._gated += not used
+            self._look(sighting)
+
+    def _look(self, sighting: Sighting) -> None:
+        """Whether the fixes are late, once a minute."""
+        self._seen.append(sighting)
+        self._unlooked += 1
+        if self._unlooked >= LOOK_EVERY:
+            self._unlooked = 0
+            found = lateness(self._seen, self.config)
+            self._lateness = found if found is not None and found.sure else None
 
     def _take(self, sighting: Sighting) -> bool:
         if self._bank is not None:

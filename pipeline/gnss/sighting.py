@@ -22,6 +22,11 @@ class Sighting:
     quality: FixQuality
 
 
+def measured_ns(fix: GnssFix, config: FusionConfig) -> int:
+    """When the antenna was there."""
+    return fix.stamp_ns - round(1e9 * config.stamped_late_s)
+
+
 class Sightings:
     """Places fixes in the odometry's history. The first one placed is the datum."""
 
@@ -35,13 +40,14 @@ class Sightings:
 
     def place(self, fix: GnssFix) -> Sighting | None:
         """None for a fix that is refused, or closer than `spacing_s` to the one before."""
-        if self._last_ns is not None and abs(fix.stamp_ns - self._last_ns) < 1e9 * self._config.spacing_s:
+        stamp_ns = measured_ns(fix, self._config)
+        if self._last_ns is not None and abs(stamp_ns - self._last_ns) < 1e9 * self._config.spacing_s:
             return None
-        passage = self._history.at(fix.stamp_ns) if usable(fix) else None
+        passage = self._history.at(stamp_ns) if usable(fix) else None
         if passage is None:
             self.refused += 1
             return None
-        self._last_ns = fix.stamp_ns
+        self._last_ns = stamp_ns
         place = (fix.latitude_deg, fix.longitude_deg, fix.height_m)
         self.datum = self.datum or Datum(*place)
         return Sighting(passage, self.datum.enu(*place), floored_m(fix, self._config), fix.quality)

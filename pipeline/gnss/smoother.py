@@ -18,6 +18,7 @@ from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.fusion import pose_from
 from pipeline.gnss.geodesy import Datum
 from pipeline.gnss.history import History
+from pipeline.gnss.lateness import lateness
 from pipeline.gnss.sighting import Sighting, Sightings
 from pipeline.gnss.tracker import Step
 from pipeline.gnss.yaw_search import YawSearch
@@ -36,11 +37,14 @@ class Knot:
 
 
 class SmoothedDrift:
-    """Where `odom` lay in `map` all along the session."""
+    """Where `odom` lay in `map` all along the session. notes: what is wrong with the fixes, in words."""
 
-    def __init__(self, knots: list[Knot], history: History, datum: Datum, drift: Array) -> None:
+    def __init__(
+        self, knots: list[Knot], history: History, datum: Datum, drift: Array, notes: tuple[str, ...] = ()
+    ) -> None:
         self.knots = knots
         self.datum = datum
+        self.notes = notes
         self._history = history
         self._drift = drift
         self._stamps = [knot.sighting.passage.stamp_ns for knot in knots]
@@ -82,13 +86,15 @@ def smooth(
         return None
     for _ in range(PASSES):
         runs = [
-            (tracker.drift, [tracker.follow(sighting) for sighting in sightings])
+            (tracker, [tracker.follow(sighting) for sighting in sightings])
             for tracker in trackers(alignment, sightings[0].passage, config)
         ]
-        drift, steps = max(runs, key=lambda run: sum(step.log_likelihood for step in run[1]))
+        likeliest, steps = max(runs, key=lambda run: sum(step.log_likelihood for step in run[1]))
         knots = backwards(steps)
         alignment = _restart(knots[0])
-    return SmoothedDrift(knots, history, placing.datum, drift)
+    late = lateness(sightings, config)
+    doubts = [*([late] if late is not None and late.sure else []), *likeliest.disputes]
+    return SmoothedDrift(knots, history, placing.datum, likeliest.drift, tuple(map(str, doubts)))
 
 
 def backwards(steps: list[Step]) -> list[Knot]:

@@ -24,6 +24,20 @@ FEWEST_REJECTED = 10
 
 
 @dataclass(frozen=True, slots=True)
+class Dispute:
+    """Odometry and fixes disagreed by `apart_m` for so long that the fixes were believed from `stamp_ns` on."""
+
+    stamp_ns: int
+    apart_m: float
+
+    def __str__(self) -> str:
+        return (
+            f"GNSS moved {self.apart_m:.0f} m away from where the way had led, stayed there and is believed since: "
+            "its positions before or after are off by that"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
     """One sighting followed. transition (13, 13) leads from the belief before to `predicted`."""
 
@@ -46,6 +60,7 @@ class Tracker:
         self.passage = first
         self.drift = _drift(config)
         """(4,) variance of x, y, z, yaw a metre."""
+        self.disputes: list[Dispute] = []
         self._trust = trust
         self._config = config
         self._rejected_ns: list[int] = []
@@ -64,6 +79,7 @@ class Tracker:
         log_likelihood = small.log_likelihood(new, config)
         used = self._gated(new, passage.stamp_ns)
         if used and not self._plausible(new):
+            self.disputes.append(Dispute(passage.stamp_ns, math.sqrt(float(new.value @ new.value))))
             predicted = _doubting(predicted, new)
             new = small.innovation(predicted, seen, config)
         after = small.corrected(predicted, new, small.huber_weights(new.chi2, config)) if used else predicted

@@ -47,6 +47,8 @@ class Odometry:
 
 
 class Fusion:
+    note = "the receiver is late"
+
     def __init__(self, config) -> None:
         self.fixes: list = []
 

@@ -55,6 +55,7 @@ class Turned:
     """`odom` lies 10 m east of the datum, turned by a quarter."""
 
     datum: Datum = DATUM
+    notes: tuple[str, ...] = ("the receiver is late",)
 
     def pose(self, estimate):
         x, y, z = estimate.position_m
