@@ -84,8 +84,8 @@ def main() -> None:
     cache = parser.parse_args().cache
     world = build(scenario("loop_800", 1))
     odometry = tracked(world, cache)
-    print("| fault | placed from, s | mean m | worst m | end m | stated m | outside | fixes used, rejected |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| fault | placed from, s | mean m | worst m | end m | stated m | outside | fixes used, rejected | said |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for case in CASES:
         print(f"| {case.name} | {row(case, world, odometry)} |", flush=True)
 
@@ -108,7 +108,7 @@ def row(case: Case, world: World, odometry: Odometry) -> str:
             found.append((estimate.stamp_ns / SECOND_NS, place - odometry.truth_m[k], pose.covariance[:3, :3]))
     state = fusion.state()
     counts = "0, 0" if state is None else f"{state.fixes_used}, {state.fixes_rejected}"
-    return f"{_figures(found)} | {counts}"
+    return f"{_figures(found)} | {counts} | {fusion.note or '-'}"
 
 
 def _figures(found: Iterable[tuple[float, np.ndarray, np.ndarray]]) -> str:
