@@ -60,7 +60,12 @@ class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     directions: int = 1
     """So many of a voxel's directions are used, the thinnest first. 1: point to plane, the plane with a thickness; with
     the others the drift is a third more, since along a surface the middle of what was seen is no place on the tree."""
-    effective: float = 300.0
+    settled_scans: float = 200.0
+    """A voxel was laid down with the error that the pose had, so what is new only repeats the drift since the old. Its
+    residual counts by its age, up to this; the residuals of a scan together count `effective` all the same."""
+    fresh_share: float = 0.05
+    """Of a voxel that has just been laid down."""
+    effective: float = 150.0
     """So many residuals a scan count as independent."""
     least_share: float = 0.15
     """Share of clusters that must meet a voxel, or the scan does not fit."""
@@ -75,12 +80,12 @@ class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class DegeneracyConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A direction is weak when the scan alone would leave it this uncertain; little of it is used then.
 
-    Over a level field, where nothing shows the way, chance alone gives 2.8 cm; in forests the worst direction of the
-    worst scan has 2.0, from a UAV.
+    Over a level field, where nothing shows the way, chance alone gives 4.0 cm; in forests the worst direction of the
+    worst scan has 2.8, from a UAV.
     """
 
-    attitude_rad: float = 0.01
-    position_m: float = 0.024
+    attitude_rad: float = 0.014
+    position_m: float = 0.034
     share_left: float = 0.03
 
 

@@ -27,14 +27,15 @@ VOXEL = 32
 intensity, scatter xx xy xz yy yz zz; then its shape: the count it was derived from, three variances ascending, their
 directions row by row. 128 bytes: what a look-up waits for is memory, so all of it lies in two cache lines."""
 THIN = 4.0
-USED, REFUSED, CURSOR, FREE = 0, 1, 2, 3
+USED, REFUSED, CURSOR, FREE, SCAN = 0, 1, 2, 3, 4
 ROUNDS = 6
 
 
 class MapArrays(NamedTuple):
     """slots (places, 2): key and row of each place in the table. voxels (rows, VOXEL).
 
-    free: stack of unused rows. numbers: rows used, voxels refused for lack of room, sweep cursor, height of the stack.
+    free: stack of unused rows. numbers: rows used, voxels refused for lack of room, sweep cursor, height of the stack,
+    the last scan taken in.
     """
 
     slots: npt.NDArray[np.int64]
@@ -133,6 +134,7 @@ def insert(
     sizes: (levels,) m. sides: 4, or 1 for none. most: points from which on a voxel keeps its shape.
     """
     slots, voxels = grid.slots, grid.voxels
+    grid.numbers[SCAN] = scan
     levels, count = len(sizes), len(clusters)
     rows = np.empty((count, levels), np.int64)
     offsets = np.empty((count, levels, 3))

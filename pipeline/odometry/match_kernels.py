@@ -17,6 +17,8 @@ from pipeline.odometry.map_kernels import (
     DIRECTIONS,
     EMPTY,
     MEAN,
+    SCAN,
+    SEEN,
     SIDES,
     VARIANCES,
     MapArrays,
@@ -39,13 +41,15 @@ def match(
     first_level: int,
     settings: Doubles,
 ) -> tuple[Doubles, Doubles, Doubles]:
-    """A (6, 6), b (6,) of attitude (body) and position; numbers (4,): matches, sum of d^2, sum of weights, directions.
+    """A (6, 6), b (6,) of attitude (body) and position; numbers (5,): matches, sum of d^2, sum of weights, directions,
+    sum of what the voxels count by their age.
 
     The update is -A^-1 b. Levels before `first_level` are left out.
     settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas), widest direction and prior variance
-    as shares of the squared size, weight of the prior in points, most directions.
+    as shares of the squared size, weight of the prior in points, most directions, scans after which a voxel counts in
+    full, share of that which it counts before.
     """
-    a, b, numbers, h = np.zeros((6, 6)), np.zeros(6), np.zeros(4), np.empty(6)
+    a, b, numbers, h = np.zeros((6, 6)), np.zeros(6), np.zeros(5), np.empty(6)
     fewest, floor, huber, gate = settings[0], settings[1] ** 2, settings[2], settings[3] ** 2
     slots, voxels, directions = grid.slots, grid.voxels, int(settings[7])
     for n in range(len(clusters)):
@@ -84,13 +88,16 @@ def match(
         numbers[0] += 1.0
         numbers[1] += distance
         numbers[2] += robust
+        age = grid.numbers[SCAN] - voxels[row, SEEN]
+        settled = max(settings[9], min(1.0, age / settings[8]))
+        numbers[4] += settled
         for k in range(directions):
             variance = voxels[row, VARIANCES + k]
             if variance >= widest:
                 break
             u = DIRECTIONS + 3 * k
             ux, uy, uz = float(voxels[row, u]), float(voxels[row, u + 1]), float(voxels[row, u + 2])
-            weight = robust * (1.0 - variance / widest) / (variance * share + floor)
+            weight = settled * robust * (1.0 - variance / widest) / (variance * share + floor)
             r = rx * ux + ry * uy + rz * uz
             # h = (q x R^T u, u): derivative of u . (R Exp(th) q + p).
             bx = rotation[0, 0] * ux + rotation[1, 0] * uy + rotation[2, 0] * uz

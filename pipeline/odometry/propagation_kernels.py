@@ -62,7 +62,7 @@ def propagate(
         for i in range(3):
             f[3 + i, 6 + i] = dt
         p = f @ p @ f.T
-        _grow(p, dt, rate, acceleration, imu[k], noise)
+        _grow(p, dt, rate, acceleration, imu[k : k + 2], noise)
 
         for i in range(3):
             position[i] += velocity[i] * dt + 0.5 * acceleration[i] * dt * dt
@@ -88,16 +88,16 @@ def _write(
 
 
 @njit(cache=True, nogil=True)
-def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, sample: Doubles, noise: Doubles) -> None:
-    """Adds the process noise of one step. Scale errors count as noise that stays for `CORRELATED_S`."""
+def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, ends: Doubles, noise: Doubles) -> None:
+    """Adds the process noise of one step between the samples `ends` (2, 7). Scale errors count as noise that stays for `CORRELATED_S`."""
     turning = rate[0] ** 2 + rate[1] ** 2 + rate[2] ** 2
     pushing = acceleration[0] ** 2 + acceleration[1] ** 2 + acceleration[2] ** 2
     gyro = noise[0] ** 2 + noise[4] ** 2 * turning * CORRELATED_S
     accel = noise[1] ** 2 + noise[5] ** 2 * pushing * CORRELATED_S
     for i in range(3):
-        if abs(sample[1 + i]) > 0.99 * noise[6]:
+        if max(abs(ends[0, 1 + i]), abs(ends[1, 1 + i])) > 0.99 * noise[6]:
             gyro += SATURATED_GYRO**2
-        if abs(sample[4 + i]) > 0.99 * noise[7]:
+        if max(abs(ends[0, 4 + i]), abs(ends[1, 4 + i])) > 0.99 * noise[7]:
             accel += SATURATED_ACCEL**2
     if dt > noise[8]:
         gyro += GAP_GYRO**2

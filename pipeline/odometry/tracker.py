@@ -79,6 +79,8 @@ class Tracker:
                 one.prior,
                 one.prior_points,
                 one.directions,
+                one.settled_scans,
+                one.fresh_share,
             ]
         )
 
@@ -167,7 +169,7 @@ class Tracker:
         )
         count = max(float(numbers[0]), 1.0)
         # Thousands of residuals share the same few errors (section 5.4 of FAST-LIO2's practice): count them as fewer.
-        share = min(1.0, self._config.match.effective / count)
+        share = min(self._config.match.effective, count) / max(float(numbers[4]), 1e-9)
         return NormalEquations(a * share, b * share, int(numbers[0]), numbers[1] / count, numbers[2] / count)
 
 

@@ -81,5 +81,5 @@ def _empty(most: int) -> kernels.MapArrays:
         slots=np.full((places, 2), kernels.EMPTY, np.int64),
         voxels=np.zeros((most, kernels.VOXEL), np.float32),
         free=np.arange(most, dtype=np.int32)[::-1].copy(),
-        numbers=np.array([0, 0, 0, most], np.int64),
+        numbers=np.array([0, 0, 0, most, 0], np.int64),
     )

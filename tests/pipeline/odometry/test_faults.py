@@ -26,7 +26,6 @@ ENDURED = {
     "samples_07": "no inertial samples",
     "samples_3": "no inertial samples",
     "silence_3": "no inertial samples",
-    "saturated": "reached its range",
     "saturated_unknown": Status.DOUBTFUL,
     "gyro_bias": Status.DOUBTFUL,
     "gyro_bias_large": Status.DOUBTFUL,
@@ -46,6 +45,7 @@ SUFFERED = {
     "in_g_midway": Status.DOUBTFUL,
     "offset_20": Status.DOUBTFUL,
     "mounted_pitch": Status.DOUBTFUL,
+    "saturated": "reached its range",
 }
 """Told, and what is off is within what is stated."""
 BLIND = {"mounted_yaw": Status.DOUBTFUL}

@@ -12,6 +12,7 @@ from pipeline.odometry.match_kernels import match
 from pipeline.odometry.voxel_map import VoxelMap
 
 CONFIG = MatchConfig()
+SCANS = 10
 SETTINGS = np.array(
     [
         CONFIG.fewest_points,
@@ -22,6 +23,8 @@ SETTINGS = np.array(
         CONFIG.prior,
         CONFIG.prior_points,
         CONFIG.directions,
+        SCANS - 2,
+        CONFIG.fresh_share,
     ]
 )
 UNBOUNDED = np.array([*SETTINGS[:2], np.inf, np.inf, *SETTINGS[4:]])
@@ -48,7 +51,7 @@ def clusters_of(points, rotation, position):
 def scene():
     """A map of some scans, another scan's clusters, and a pose a little off."""
     grown = VoxelMap(MapConfig(voxels_most=50_000))
-    for seed in range(10):
+    for seed in range(SCANS):
         grown.insert(clusters_of(grove(seed), np.eye(3), np.zeros(3)), np.eye(3), np.zeros(3))
     rotation, position = Rotation.from_euler("xyz", [0.004, -0.003, 0.006]).as_matrix(), np.array([0.03, -0.02, 0.01])
     clusters = clusters_of(grove(9)[::5], np.eye(3), np.zeros(3))
@@ -65,7 +68,7 @@ def voxels(grown):
 
 def residuals(grown, clusters, rotation, position, settings=SETTINGS):
     """Slow and obvious: for each cluster that meets a voxel, (q, r, [(direction, weight)], distance)."""
-    fewest, floor, huber, gate, wide, prior, extra, most = settings
+    fewest, floor, huber, gate, wide, prior, extra, most, settled, fresh = settings
     table = voxels(grown)
     for row in clusters:
         q = row[1:4]
@@ -88,17 +91,18 @@ def residuals(grown, clusters, rotation, position, settings=SETTINGS):
             distance = float(np.sum(((r @ vectors) ** 2 / variance)[used]))
             if distance <= gate**2:
                 robust = 1.0 if distance <= huber**2 else huber / math.sqrt(distance)
-                weights = robust * (1.0 - values / (wide * size**2)) / variance
-                yield q, r, [(vectors[:, k], weights[k]) for k in range(3) if used[k]], distance, robust
+                age = np.clip((SCANS - voxel[kernels.SEEN]) / settled, fresh, 1.0)
+                weights = age * robust * (1.0 - values / (wide * size**2)) / variance
+                yield q, r, [(vectors[:, k], weights[k]) for k in range(3) if used[k]], distance, robust, age
             break
 
 
 def test_the_normal_equations_are_the_sums_over_clusters_and_voxels(scene):
     grown, clusters, rotation, position = scene
     a, b, numbers = match(grown.arrays, clusters, rotation, position, grown.sizes, 4, 0, SETTINGS)
-    expected_a, expected_b, sums = np.zeros((6, 6)), np.zeros(6), np.zeros(4)
-    for q, r, directions, distance, robust in residuals(grown, clusters, rotation, position):
-        sums += [1, distance, robust, len(directions)]
+    expected_a, expected_b, sums = np.zeros((6, 6)), np.zeros(6), np.zeros(5)
+    for q, r, directions, distance, robust, age in residuals(grown, clusters, rotation, position):
+        sums += [1, distance, robust, len(directions), age]
         for u, weight in directions:
             h = np.concatenate([np.cross(q, rotation.T @ u), u])
             expected_a += weight * np.outer(h, h)
@@ -120,7 +124,7 @@ def test_the_gradient_is_the_derivative_of_the_cost(scene):
 
     def cost(error):
         turn, shift = rotation @ so3.exp(error[:3]), error[3:] + position
-        moved = (turn @ q + shift - (rotation @ q + position - r) for q, r, _, _, _ in pairs)
+        moved = (turn @ q + shift - (rotation @ q + position - r) for q, r, *_ in pairs)
         return sum(0.5 * w * (u @ m) ** 2 for m, pair in zip(moved, pairs, strict=True) for u, w in pair[2])
 
     step, steps = 1e-4, np.eye(6)

@@ -67,12 +67,12 @@ def test_a_ride_can_be_joined_too(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_flight_can_be_joined_and_says_that_it_does_not_fit(tmp_path):
-    """It begins a degree or two off the vertical, climbs by that, with too small a sigma: the word is left."""
+def test_a_flight_can_be_joined_within_what_is_stated(tmp_path):
+    """It begins a degree or two off the vertical and climbs by that; it says that the scans leave a direction open."""
     tilt_deg, outcome = joined_on_the_way("uav", tmp_path)
-    assert outcome.end_m < 0.7
+    assert outcome.end_m < 2.0 * outcome.end_sigma_m < 4.0
     assert tilt_deg < 3.0
-    assert outcome.statuses[Status.DOUBTFUL] > 0
+    assert outcome.statuses[Status.DEGENERATE] > 0
 
 
 def refusal(streams, fault):
