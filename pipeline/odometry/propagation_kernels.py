@@ -89,7 +89,10 @@ def _write(
 
 @njit(cache=True, nogil=True)
 def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, ends: Doubles, noise: Doubles) -> None:
-    """Adds the process noise of one step between the samples `ends` (2, 7). Scale errors count as noise that stays for `CORRELATED_S`."""
+    """Adds the process noise of one step, between the samples `ends` (2, 7).
+
+    Scale errors count as noise that stays for `CORRELATED_S`.
+    """
     turning = rate[0] ** 2 + rate[1] ** 2 + rate[2] ** 2
     pushing = acceleration[0] ** 2 + acceleration[1] ** 2 + acceleration[2] ** 2
     gyro = noise[0] ** 2 + noise[4] ** 2 * turning * CORRELATED_S
