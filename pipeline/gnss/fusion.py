@@ -62,7 +62,8 @@ class GnssFusion:
     def note(self) -> str:
         """What the operator should know of the receiver; empty where nothing is wrong."""
         disputes = self._bank.disputes if self._bank is not None else []
-        return "; ".join(map(str, ([self._lateness] if self._lateness is not None else []) + disputes[-1:]))
+        doubts = [*([self._lateness] if self._lateness is not None else []), *disputes[-1:]]
+        return "; ".join(map(str, doubts))
 
     def state(self) -> MapToOdom | None:
         """None before the first fix in this `odom`."""

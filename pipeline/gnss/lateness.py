@@ -1,8 +1,8 @@
 """How late the fixes are stamped, from where the way bends.
 
-A fix that is stamped too late lies back along the way. On a straight way that is an offset like any other; in a bend it
-is not. The receiver's error lasts (Gauss-Markov) and the odometry drifts, so what is compared is the change from one fix
-to the next.
+A fix that is stamped too late lies back along the way. On a straight way that is an offset like any other, but not in
+a bend. The receiver's error lasts (Gauss-Markov) and the odometry drifts, so what is compared is the change from one
+fix to the next.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Real = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """late_s: by how much the stamps are too late. aside_s: the same of a shift across the way; there should be none."""
+    """late_s: by how much the stamps are too late. aside_s: the same across the way, where there should be none."""
 
     late_s: float
     aside_s: float
