@@ -14,11 +14,13 @@ from distributed import Client, LocalCluster
 from distributed.system import MEMORY_LIMIT
 
 from edge import __version__
-from edge.batch.worker import Look, look
+from edge.batch.worker import Look, look, version
 from edge.errors import ClusterError
 
 WAIT_S = 15.0
 """For a scheduler to answer, and for its first worker."""
+_SAME = "install the same one there"
+_NO_MAPFOREST = f"cannot load mapforest ({{}}): install mapforest {__version__} with the extra `cluster` there"
 START = "dask worker {} --nworkers 4 --nthreads 1 --resources 'memory=8e9'"
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 2,
@@ -37,7 +39,9 @@ def memory_bytes() -> int:
 
 def hush() -> None:
     """What Dask logs of workers that come and go is said by us, in our words."""
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    for name in ("distributed", *logging.root.manager.loggerDict):
+        if name.startswith("distributed"):  # some have levels of their own
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 @contextmanager
@@ -88,8 +92,9 @@ def existing(address: str) -> Iterator[Client]:
 
 
 def fit_workers(client: Client, directory: Path, sessions: int) -> list[Look]:
-    """All of them as they say they are. ClusterError where one is not fit, with what to do."""
+    """All of them as they say they are. ClusterError where one, or the scheduler, is not fit, with what to do."""
     where = client.scheduler.address
+    _check_scheduler(client, where)
     try:
         client.wait_for_workers(1, timeout=WAIT_S)
     except TimeoutError:
@@ -101,14 +106,24 @@ def fit_workers(client: Client, directory: Path, sessions: int) -> list[Look]:
     return list(found.values())
 
 
+def _check_scheduler(client: Client, where: str) -> None:
+    """It unpacks the tasks that it hands on."""
+    try:
+        there = client.run_on_scheduler(version)
+    except Exception as error:  # whatever it raised over there, as Dask hands it on
+        raise ClusterError(f"the scheduler at {where} {_NO_MAPFOREST.format(error)}") from error
+    if there != __version__:
+        raise ClusterError(f"the scheduler at {where} runs mapforest {there}, and this is {__version__}: {_SAME}")
+
+
 def _unfit(told: Look | BaseException, directory: Path, sessions: int, scheduler: str) -> str:
     """Empty for one that is fit."""
-    if isinstance(told, ModuleNotFoundError):
-        return f"has no {told.name}: install mapforest {__version__} with the extra `cluster` there"
+    if "No module named" in str(told):  # Dask hands on its text, not the error
+        return _NO_MAPFOREST.format(told)
     if isinstance(told, BaseException):
         return f"cannot say what it sees: {type(told).__name__}: {told}"
     if told.version != __version__:
-        return f"runs mapforest {told.version}, and this is {__version__}: install the same one there"
+        return f"runs mapforest {told.version}, and this is {__version__}: {_SAME}"
     if told.sessions != sessions:
         seen = f"sees {told.sessions} of the {sessions} sessions in" if told.sessions else "does not see"
         return f"{seen} {directory}: mount it there at the same place"

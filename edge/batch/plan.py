@@ -16,7 +16,7 @@ MIB = 1 << 20
 _NEEDS: dict[Stage, tuple[int, float]] = {
     "process": (1024 * MIB, 0.2),
     "refine": (1024 * MIB, 0.5),
-    "report": (512 * MIB, 0.2),
+    "report": (768 * MIB, 0.2),
 }
 """Bytes of any session, and for each byte of the recording: docs/batch.md has what was measured."""
 

@@ -48,7 +48,8 @@ class Batch:
         """All sessions; an outcome each, in order. ClusterError when the scheduler is lost."""
         schedule = Schedule(plans)
         self._client.subscribe_topic(self._topic, lambda event: self._hear(schedule, event[1]))
-        steps = {self._submit(step): step for step in schedule.first()}
+        biggest_first = sorted(schedule.first(), key=lambda step: -step.memory_bytes)
+        steps = {self._submit(step): step for step in biggest_first}
         waiting = as_completed(list(steps), loop=self._client.loop)
         for future in waiting:
             following = self._ended(schedule, steps.pop(future), future)

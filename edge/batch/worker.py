@@ -35,6 +35,11 @@ class Look(msgspec.Struct, frozen=True):
     refine: bool
 
 
+def version() -> str:
+    """Run on the scheduler, which has to load what it hands on."""
+    return __version__
+
+
 def look(directory: Path, dask_worker: Worker) -> Look:
     """Run on every worker before anything else."""
     try:
@@ -45,10 +50,10 @@ def look(directory: Path, dask_worker: Worker) -> Look:
     return Look(__version__, sessions, resources.get("memory", 0.0), threads, find_spec(REFINE) is not None)
 
 
-def run(step: Step, config: Config, version: str, topic: str) -> Finished:
+def run(step: Step, config: Config, expected: str, topic: str) -> Finished:
     """The task. A worker that came later, of another version, is caught here."""
-    if version != __version__:
-        raise ClusterError(f"a worker runs mapforest {__version__}, not {version}: install the same one there")
+    if expected != __version__:
+        raise ClusterError(f"a worker runs mapforest {__version__}, not {expected}: install the same one there")
     for name in ("edge", "pipeline", "pyogrio"):  # what has to be said stands in the products' notes
         logging.getLogger(name).setLevel(logging.ERROR)
     return work(step, config, _Told(get_worker(), topic, step))

@@ -39,8 +39,8 @@ done is not done again: interrupted, or run again after more sessions came, it g
 does not stop the others: the list at the end has its reason, and the exit code is 1. The report is on the refined
 products where there are some. Needs the extra `cluster`; without the extra `refine` that part is left out.
 
-Workers of another machine need the same version of mapforest, see the directory at the same place, and declare their
-memory: dask worker ADDRESS --nworkers 4 --nthreads 1 --resources 'memory=8e9' (bytes, each)"""
+A scheduler and workers of other machines need the same version of mapforest. Workers see the directory at the same
+place, and declare their memory: dask worker ADDRESS --nworkers 4 --nthreads 1 --resources 'memory=8e9' (bytes, each)"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -19,10 +19,16 @@ FIT = Look(__version__, 2, 8e9, 1, refine=True)
 class Workers:
     """A client whose workers say this."""
 
-    def __init__(self, *told) -> None:
+    def __init__(self, *told, scheduler=__version__) -> None:
+        self.version = scheduler
         self.told = {f"tcp://10.0.0.{number}:4000": one for number, one in enumerate(told)}
         self.scheduler = self
         self.address = "tcp://10.0.0.9:8786"
+
+    def run_on_scheduler(self, function):
+        if isinstance(self.version, Exception):
+            raise self.version
+        return self.version
 
     def wait_for_workers(self, count, timeout):
         if len(self.told) < count:
@@ -51,10 +57,20 @@ def test_an_unfit_worker_is_named_with_what_to_do(told, words, tmp_path):
 
 
 def test_a_worker_without_mapforest_says_what_is_missing():
-    with pytest.raises(ClusterError, match=r"has no edge: install mapforest .* with the extra `cluster` there"):
-        cluster.fit_workers(Workers(ModuleNotFoundError("No module named 'edge'", name="edge")), "/data", 2)
+    missing = Exception("ModuleNotFoundError(\"No module named 'edge'\")")
+    with pytest.raises(
+        ClusterError, match=r"cannot load mapforest .*'edge'.*: install mapforest .* with the extra `cluster`"
+    ):
+        cluster.fit_workers(Workers(missing), "/data", 2)
     with pytest.raises(ClusterError, match="cannot say what it sees: PermissionError"):
         cluster.fit_workers(Workers(PermissionError("no")), "/data", 2)
+
+
+def test_the_scheduler_too_needs_mapforest_of_the_same_version():
+    with pytest.raises(ClusterError, match=r"the scheduler at tcp://10.* runs mapforest 0\.0\.9, and this is"):
+        cluster.fit_workers(Workers(FIT, scheduler="0.0.9"), "/data", 2)
+    with pytest.raises(ClusterError, match=r"the scheduler at tcp://10.* cannot load mapforest \(No module"):
+        cluster.fit_workers(Workers(FIT, scheduler=ModuleNotFoundError("No module named 'edge'")), "/data", 2)
 
 
 def test_a_scheduler_without_workers_and_one_that_is_not_there_are_told(monkeypatch):
