@@ -37,6 +37,7 @@ BARK_M = 0.15
 """Beyond this from the fitted bark a point is something else; a spread of 0.11 m says only that."""
 LEAST_BARK, LEAST_DBH_M = 50, 0.1
 """Of thinner stems the far side is within reach."""
+_UNTIMED = "the points carry no time, and no number of their recording"
 _SHARES = (0.5, 0.6)
 """Of the work, when stems are found, and when the points wait on the disk."""
 
@@ -126,9 +127,6 @@ def map_quality(
         None if reference is None else _overlap(looked.beside, "the reference has no surface where the map has one"),
         control_errors(residuals) if asked.control else None,
     )
-
-
-_UNTIMED = "the points carry no time, and no number of their recording"
 
 
 @dataclass(eq=False)
