@@ -5,6 +5,7 @@ EdgeError
 ├── RecordingError   a session cannot be started, written or finished
 ├── FormatError      a file is not the recording it should be
 ├── ControlError     the recorder cannot be reached, or refused a request
+├── ClusterError     a scheduler or its workers cannot be reached, or are not fit for a batch
 └── UsageError       the command line asks for something that makes no sense
 """
 
@@ -27,6 +28,10 @@ class FormatError(EdgeError):
 
 class ControlError(EdgeError):
     """The recorder cannot be reached, or refused a request."""
+
+
+class ClusterError(EdgeError):
+    """A scheduler or its workers cannot be reached, or are not fit for a batch."""
 
 
 class UsageError(EdgeError):

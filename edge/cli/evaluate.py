@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import importlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +21,9 @@ from edge.validation.clock_truth import ClockReport, clock_reports
 if TYPE_CHECKING:  # heavy: scipy
     from pipeline.evaluation.pair import Pair
 
-WHAT = ("clocks", "trajectory", "trees", "diameters", "alignment", "detection")
+WHAT = ("clocks", "trajectory", "trees", "diameters", "alignment", "detection", "map")
+_APART = {"detection": "edge.cli.detections", "alignment": "edge.cli.alignments", "map": "edge.cli.maps"}
+"""These look at their arguments themselves."""
 HELP = """compare estimates with ground truth
 
 example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth demo/truth
@@ -30,6 +34,8 @@ example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth
          mapforest evaluate alignment plot7_aligned --truth truth.txt
          mapforest evaluate diameters plot_inventory --truth field_list.csv --page diameters.html
          mapforest evaluate detection models/ailanthus.onnx datasets/autumn --page curves.html --worst worst.jpg
+         mapforest evaluate map recordings/20261124T101500Z_walk --control surveyed.csv
+         mapforest evaluate map walk.laz --reference scanned.laz
 
 clocks: offset and drift of each sensor's clock, estimated while recording, against the emulated payload's truth.
 trajectory: what `mapforest process` made of a session and what the live pipeline recorded in it, or a TUM file, against
@@ -43,20 +49,23 @@ diameters: what `mapforest inventory` measured, against a field list (CSV with x
 MRE, RMSE, bias, completeness and commission, a scatter plot.
 detection: an ONNX model ("demo" for ours), or a folder of another program's predictions (YOLO texts with confidences),
 against a folder with images/, labels/, classes.txt and, to be told by site, sites.csv (image,site): precision, recall
-and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew."""
+and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew.
+map: a LAS, LAZ or PLY, or a session's, without truth: entropy, thickness of planes and of bark, and how far surfaces
+are apart that passes at different times show; beside another map of the place (--reference); against surveyed points
+of the ground (--control, a CSV with name,x,y,z in the map's coordinates)."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
         "what",
-        choices=["clocks", "trajectory", "trees", "diameters", "alignment", "detection"],
+        choices=WHAT,
         help="what to evaluate",
     )
     parser.add_argument(
         "estimate",
         type=Path,
-        help="session folder; trajectory: also products, or a TUM file; detection: a model, or predictions",
+        help="session folder; trajectory: also products, or a TUM file; detection: model, or predictions; map: file",
     )
     parser.add_argument("dataset", type=Path, nargs="?", help="detection: labelled images")
     parser.add_argument(
@@ -77,18 +86,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="C",
         help="detection: of the operating point (detection.confidence, else what the model advises)",
     )
+    parser.add_argument("--reference", type=Path, metavar="MAP", help="map: another one of the place")
+    parser.add_argument("--control", type=Path, metavar="CSV", help="map: surveyed points of the ground: name,x,y,z")
+    parser.add_argument("--radius", type=float, default=0.3, metavar="M", help="map: around a point")
+    parser.add_argument("--gap", type=float, default=30.0, metavar="S", help="map: this far apart are two passes")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
-    if args.what == "detection":
-        from edge.cli import detections
-
-        return detections.run(args)
-    if args.what == "alignment":
-        from edge.cli import alignments
-
-        return alignments.run(args)
+    if args.what in _APART:
+        command: Callable[[argparse.Namespace], int] = importlib.import_module(_APART[args.what]).run
+        return command(args)
     if args.truth is None or args.dataset is not None:
         raise UsageError(f"evaluate {args.what}: give one session, and its truth with --truth")
     if args.what == "diameters":

@@ -25,12 +25,15 @@ LAS_REFLECTOR = 150 * 257
 class Part:
     """Some points. xyz_m: (n, 3) from the map's origin. reflector: (n,), False where intensity says nothing.
 
-    sensor_m: (n, 2) where the scanner stood, None where the map does not say.
+    sensor_m: (n, 2) where the scanner stood, time_s: (n,) when it measured, source: (n,) the number of its recording,
+    the last two as LAS has them; None where the map does not say.
     """
 
     xyz_m: Floats
     reflector: npt.NDArray[np.bool_]
     sensor_m: Floats | None = None
+    time_s: Doubles | None = None
+    source: npt.NDArray[np.uint16] | None = None
 
 
 class MapSource(Protocol):
@@ -117,7 +120,9 @@ class LasMap:
         xyz = (np.column_stack([record.x, record.y, record.z]) - self.origin_m).astype(np.float32)
         xyz[_useless(record)] = np.nan
         bright = np.asarray(record.intensity) >= LAS_REFLECTOR if self._ours else np.zeros(len(xyz), np.bool_)
-        return Part(xyz, bright)
+        timed = "gps_time" in record.point_format.dimension_names
+        time_s = np.array(record.gps_time, np.float64) if timed else None
+        return Part(xyz, bright, time_s=time_s, source=np.array(record.point_source_id, np.uint16))
 
 
 def _useless(record: Any) -> npt.NDArray[np.bool_]:
