@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,56 +49,56 @@ def run(args: argparse.Namespace) -> int:
 
     logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     config, tasks = load(args.config), [Task([session]) for session in args.session]
+    if args.out is not None and len(tasks) == 1:
+        raise UsageError("--out: it is for several sessions; one has its refinement among its products")
     with StageBar(quiet=args.json) as bar:
-        if len(tasks) > 1:
-            found = refine_together(tasks, config, args.out, args.constraints, watch=bar)
-            done, folders, redone = (
-                found.sessions,
-                [found.folder / group.folder for group in found.groups],
-                found.redone,
-            )
-        elif args.out is not None:
-            raise UsageError("--out: it is for several sessions; one has its refinement among its products")
-        else:
+        if len(tasks) == 1:
             one = refine(tasks[0], config, args.constraints, bar)
-            done, folders, redone = (one,), [one.folder], one.redone
+            done, graphs = [one], [one.folder]
+        else:
+            found = refine_together(tasks, config, args.out, args.constraints, watch=bar)
+            done, graphs = list(found.sessions), [found.folder / group.folder for group in found.groups]
     if args.json:
-        told = [{"folder": str(each.folder), **msgspec.to_builtins(each.facts)} for each in done]
-        graphs = [str(folder) for folder in folders]
-        print(msgspec.json.encode({"sessions": told, "graphs": graphs, "redone": redone}).decode())
+        told = [{"folder": str(one.folder), "redone": one.redone, **msgspec.to_builtins(one.facts)} for one in done]
+        print(msgspec.json.encode(told).decode())
     else:
-        _tell(done, folders, redone)
+        if not any(one.redone for one in done):
+            console().print("nothing had changed since the last run")
+        for folder in graphs:
+            _tell_graph(folder)
+        for one in done:
+            _tell(one)
     return exit_codes.WARNINGS if any(each.facts.frame == "odom" for each in done) else exit_codes.GOOD
 
 
-def _tell(done: Sequence[Refined], folders: Sequence[Path], redone: Sequence[str]) -> None:
+def _tell_graph(folder: Path) -> None:
     from edge.process.refinement_stage import CLOSURES, PAGE, REFINEMENT, RefinementFacts
     from edge.process.together import MAP
 
-    out = console()
-    if not redone:
-        out.print("nothing had changed since the last run")
-    for folder in folders:
-        found = msgspec.json.decode((folder / REFINEMENT).read_bytes(), type=RefinementFacts)
-        out.print(
-            f"[bold]{escape(', '.join(found.sessions))}[/]: {found.keyframes} keyframes, {found.fixes_used} of "
-            f"{found.fixes} fixes used, {found.closures} of {found.candidates} closures believed"
-            + (f", {found.between_sessions} of them between sessions" if len(found.sessions) > 1 else ""),
-            highlight=False,
-        )
-        for note in found.notes:
-            out.print(f"  {escape(note)}", highlight=False)
-        shown = {PAGE: "the graph: what was believed, and lines to correct it", CLOSURES: "every candidate, and why"}
-        if len(found.sessions) > 1:
-            shown[MAP] = "points of all sessions; the point source ID is the number of the session"
-        for name, meaning in shown.items():
-            if (folder / name).exists():
-                out.print(f"  {escape(str(folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)
-    for each in done:
-        facts = each.facts
-        sigma = f"sigma at the end {facts.sigma_end_m:.2f} m"
-        out.print(f"[bold]{escape(facts.session)}[/]: {len(facts.files)} products, {sigma}", highlight=False)
-        for note in facts.notes:
-            out.print(f"  {escape(note)}", highlight=False)
-        for name, meaning in facts.files.items():
-            out.print(f"  {escape(str(each.folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)
+    out, found = console(), msgspec.json.decode((folder / REFINEMENT).read_bytes(), type=RefinementFacts)
+    several = len(found.sessions) > 1
+    out.print(
+        f"[bold]{escape(', '.join(found.sessions))}[/]: {found.keyframes} keyframes, {found.fixes_used} of "
+        f"{found.fixes} fixes used, {found.closures} of {found.candidates} closures believed"
+        + (f", {found.between_sessions} of them between sessions" if several else ""),
+        highlight=False,
+    )
+    for note in found.notes:
+        out.print(f"  {escape(note)}", highlight=False)
+    shown = {PAGE: "the graph: what was believed, and lines to correct it", CLOSURES: "every candidate, and why"}
+    if several:
+        shown[MAP] = "points of all sessions; the point source ID is the number of the session"
+    _tell_files(folder, {name: meaning for name, meaning in shown.items() if (folder / name).exists()})
+
+
+def _tell(done: Refined) -> None:
+    out, facts = console(), done.facts
+    out.print(f"[bold]{escape(facts.session)}[/]: sigma at the end {facts.sigma_end_m:.2f} m", highlight=False)
+    for note in facts.notes:
+        out.print(f"  {escape(note)}", highlight=False)
+    _tell_files(done.folder, facts.files)
+
+
+def _tell_files(folder: Path, files: Mapping[str, str]) -> None:
+    for name, meaning in files.items():
+        console().print(f"  {escape(str(folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)

@@ -24,6 +24,7 @@ from pipeline.refinement.submaps import read_submaps
 from pipeline.refinement.table import write_closures
 
 REFINEMENT, CLOSURES, PAGE, LOCAL = "refinement.json", "closures.csv", "refinement.html", "trajectory_refined.tum"
+MADE = (REFINEMENT, CLOSURES, PAGE)
 
 
 class RefinementFacts(msgspec.Struct):
@@ -92,6 +93,7 @@ def write_refined(found: Refined, given: Sequence[Given], output: Path, software
 
 def _write_placement(one: Given, session: Session, solved: Solution) -> None:
     fused = FusionFacts(fixes=len(session.fixes), why=_why_not(len(session.fixes)))
+    (one.own / LOCAL).unlink(missing_ok=True)
     placed = placement(session.track, solved)
     if placed is not None:
         write_placement(one.placement / PLACEMENT, placed)

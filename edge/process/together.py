@@ -38,7 +38,7 @@ class Group(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Together:
-    """groups: the largest first, with their folders. sessions: each one's products. points: of each group's map."""
+    """groups: the largest first. sessions: each one's products, as they were named. redone: in all of it."""
 
     folder: Path
     groups: tuple[Group, ...]
@@ -74,7 +74,7 @@ def refine_together(
     with alone(folder / "work"):
         site = _Site(tasks, config, asked, watch, Checkpoint(folder / "work"), folder)
         redone += site.run()
-        done = tuple(Refined(work.output, read_facts(work.output), ()) for work in site.works)
+        done = tuple(Refined(work.output, read_facts(work.output), tuple(redone)) for work in site.works)
         return Together(folder, tuple(site.groups()), done, tuple(redone))
 
 
@@ -122,6 +122,7 @@ class _Site:
         with told("sessions together"):
             from edge.process.refinement_stage import solve, write_refined  # noqa: PLC0415 - GTSAM
 
+            self._clear()
             for work in self.works:
                 (folder / work.name).mkdir()
                 work.output.mkdir(exist_ok=True)
@@ -132,6 +133,14 @@ class _Site:
                 (self.output / group.folder).mkdir(exist_ok=True)
                 write_refined(one, given, self.output / group.folder, f"mapforest {__version__}")
             (self.output / GROUPS).write_bytes(msgspec.json.encode(groups))
+
+    def _clear(self) -> None:
+        """What an earlier run left of groups that may be others now."""
+        from edge.process.refinement_stage import MADE  # noqa: PLC0415 - GTSAM
+
+        for group in self.groups() if (self.output / GROUPS).exists() else ():
+            for name in (*MADE, *((MAP,) if len(group.sessions) > 1 else ())):
+                (self.output / group.folder / name).unlink(missing_ok=True)
 
     def _mapped(self, group: Group) -> bool:
         """Whether there is one map of several sessions."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,9 @@ def write_page(path: Path, found: Refined) -> None:
     """Write it."""
     parts = [sheet.facts(_facts(found)), sheet.figure("Way and closures from above", way(found), _WAY)]
     parts += [sheet.figure(title, plot) for title, plot in residuals(found)]
-    parts.append(sheet.figures("Closures", HEADER, [*rows(found)], _CLOSURES))
+    parts.append(
+        sheet.figures("Closures", _shown(HEADER, found), [_shown(row, found) for row in rows(found)], _CLOSURES)
+    )
     if lines := "\n".join(_lines(found)):
         parts += [sheet.subtitle("Lines for constraints.toml"), sheet.words(_LINES), sheet.code(lines)]
     parts.append(sheet.notes([*found.notes, _PINS]))
@@ -127,6 +129,12 @@ def _lines(found: Refined) -> Iterator[str]:
         begin, end = max(from_s - _AROUND_S, 0.0), min(to_s + _AROUND_S, last_s)
         of = f"session = {_quoted(names[number])}\n" if len(names) > 1 else ""
         yield f"[[drop_gnss]]  # {count} fixes are left out\n{of}from_s = {begin:.1f}\nto_s = {end:.1f}\n"
+
+
+def _shown(row: Sequence[str], found: Refined) -> list[str]:
+    """Without the names of the sessions where there is one."""
+    names = (HEADER.index("a"), HEADER.index("b")) if len(found.problem.names) == 1 else ()
+    return [cell for k, cell in enumerate(row) if k not in names]
 
 
 def _quoted(name: str) -> str:
