@@ -97,7 +97,7 @@ def main() -> None:
         _block(
             "our odometry",
             [
-                Walk(tracked(world, arguments.cache), _datum(world), heard)
+                Walk(tracked(world, arguments.cache), datum_of(world), heard)
                 for (world, _), heard in zip(worlds, fixes, strict=True)
             ],
         )
@@ -105,7 +105,7 @@ def main() -> None:
         _block(
             f"odometry that drifts by {label} of the way",
             [
-                Walk(drifted(world.trajectory, DRIFTS[label], seed), _datum(world), heard)
+                Walk(drifted(world.trajectory, DRIFTS[label], seed), datum_of(world), heard)
                 for (world, seed), heard in zip(worlds, fixes, strict=True)
             ],
         )
@@ -186,7 +186,7 @@ def _errors(walk: Walk, poses: list[tuple[int, GlobalPose, Datum]]) -> Errors:
     return Errors(np.array(errors), walk.odometry.alone_m[[k for k, _, _ in poses]], float(np.mean(nees)))
 
 
-def _datum(world: World) -> Datum:
+def datum_of(world: World) -> Datum:
     datum = world.config.datum
     return Datum(datum.latitude_deg, datum.longitude_deg, datum.height_m)
 

@@ -52,12 +52,15 @@ def tracked(world: World, cache: Path) -> Odometry:
         for k, stamp in enumerate(stamps)
     ]
     truth, rotations = world.trajectory.poses(stamps)
-    turn = rotations[0] @ rotation[0].T
+    alone = (position - position[0]) @ level(rotations[0] @ rotation[0].T).T + truth[0] - truth
+    return Odometry(estimates, truth, np.linalg.norm(alone, axis=1))
+
+
+def level(turn: np.ndarray) -> np.ndarray:
+    """(3, 3) the yaw of a rotation alone."""
     yaw = np.arctan2(turn[1, 0], turn[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
-    level = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    alone = (position - position[0]) @ level.T + truth[0] - truth
-    return Odometry(estimates, truth, np.linalg.norm(alone, axis=1))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _travelled(position: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "recover": ("edge.cli.recover", "copy everything sound out of a damaged recording"),
     "info": ("edge.cli.info", "topics, types, counts and rates of a recording"),
     "process": ("edge.cli.process", "odometry, GNSS fusion, detection and products from a recording"),
-    "refine": ("edge.cli.refine", "the best trajectory and map that a processed session can give"),
+    "refine": ("edge.cli.refine", "the best trajectory and map that a session can give, or several of one site"),
     "batch": ("edge.cli.batch", "process, refine and report over all sessions of a directory, on many cores"),
     "align": ("edge.cli.align", "a ground map brought onto an aerial one, with a verdict"),
     "inventory": ("edge.cli.inventory", "stems, diameters, heights and crowns from a map"),

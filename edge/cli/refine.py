@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,56 +23,82 @@ if TYPE_CHECKING:
 HELP = """the best trajectory and map that a session can give: a factor graph over odometry, GNSS and closed loops
 
 example: mapforest refine recordings/20261124T101500Z_walk
-         mapforest refine recordings/*_walk --json
          mapforest refine recordings/20261124T101500Z_walk --constraints corrections.toml
+         mapforest refine recordings/*_oakhill --out oakhill
 
-Sessions are processed first where they are not. What comes out lies in `products/refined/`: the products again, and
-refinement.html, which shows the graph and offers lines for products/refined/constraints.toml. What is done is not done
-again. It needs the extra `refine` and Python 3.11 or later."""
+Sessions are processed first where they are not. What comes out of one lies in `products/refined/`: the products again,
+and refinement.html, which shows the graph and offers lines for constraints.toml beside it. Several sessions of one site
+are refined together: a folder with one map of all, and the products of each. Those that do not meet are refined alone,
+which is said. What is done is not done again. It needs the extra `refine` and Python 3.11 or later."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("session", type=Path, nargs="+", help="folders of sessions, or .mcap files: each by itself")
-    parser.add_argument("--constraints", type=Path, metavar="FILE", help="the analyst's corrections, for one session")
+    parser.add_argument(
+        "session", type=Path, nargs="+", help="folders of sessions, or .mcap files: of one site, together"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="of several sessions (default: beside the first one)")
+    parser.add_argument("--constraints", type=Path, metavar="FILE", help="the analyst's corrections")
 
 
 def run(args: argparse.Namespace) -> int:
     """Warnings where a session could not be put on the Earth."""
     from edge.process.process import Task
     from edge.process.refine import refine
+    from edge.process.together import refine_together
 
-    if args.constraints is not None and len(args.session) > 1:
-        raise UsageError("--constraints: they belong to one session; name that one alone")
     logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
-    config, code, told = load(args.config), exit_codes.GOOD, []
-    for session in args.session:
-        with StageBar(quiet=args.json) as bar:
-            done = refine(Task([session]), config, args.constraints, bar)
-        code = exit_codes.WARNINGS if done.facts.frame == "odom" else code
-        if args.json:
-            told.append({"folder": str(done.folder), "redone": done.redone, **msgspec.to_builtins(done.facts)})
+    config, tasks = load(args.config), [Task([session]) for session in args.session]
+    if args.out is not None and len(tasks) == 1:
+        raise UsageError("--out: it is for several sessions; one has its refinement among its products")
+    with StageBar(quiet=args.json) as bar:
+        if len(tasks) == 1:
+            one = refine(tasks[0], config, args.constraints, bar)
+            done, graphs = [one], [one.folder]
         else:
-            _tell(done)
+            found = refine_together(tasks, config, args.out, args.constraints, watch=bar)
+            done, graphs = list(found.sessions), [found.folder / group.folder for group in found.groups]
     if args.json:
+        told = [{"folder": str(one.folder), "redone": one.redone, **msgspec.to_builtins(one.facts)} for one in done]
         print(msgspec.json.encode(told).decode())
-    return code
+    else:
+        if not any(one.redone for one in done):
+            console().print("nothing had changed since the last run")
+        for folder in graphs:
+            _tell_graph(folder)
+        for one in done:
+            _tell(one)
+    return exit_codes.WARNINGS if any(each.facts.frame == "odom" for each in done) else exit_codes.GOOD
+
+
+def _tell_graph(folder: Path) -> None:
+    from edge.process.refinement_stage import CLOSURES, PAGE, REFINEMENT, RefinementFacts
+    from edge.process.together import MAP
+
+    out, found = console(), msgspec.json.decode((folder / REFINEMENT).read_bytes(), type=RefinementFacts)
+    several = len(found.sessions) > 1
+    out.print(
+        f"[bold]{escape(', '.join(found.sessions))}[/]: {found.keyframes} keyframes, {found.fixes_used} of "
+        f"{found.fixes} fixes used, {found.closures} of {found.candidates} closures believed"
+        + (f", {found.between_sessions} of them between sessions" if several else ""),
+        highlight=False,
+    )
+    for note in found.notes:
+        out.print(f"  {escape(note)}", highlight=False)
+    shown = {PAGE: "the graph: what was believed, and lines to correct it", CLOSURES: "every candidate, and why"}
+    if several:
+        shown[MAP] = "points of all sessions; the point source ID is the number of the session"
+    _tell_files(folder, {name: meaning for name, meaning in shown.items() if (folder / name).exists()})
 
 
 def _tell(done: Refined) -> None:
-    from edge.process.refinement_stage import CLOSURES, PAGE, REFINEMENT, RefinementFacts
-
     out, facts = console(), done.facts
-    found = msgspec.json.decode((done.folder / REFINEMENT).read_bytes(), type=RefinementFacts)
-    unchanged = "" if done.redone else "; nothing had changed since the last run"
-    out.print(
-        f"[bold]{escape(facts.session)}[/]: {found.keyframes} keyframes, {found.fixes_used} of {found.fixes} fixes "
-        f"used, {found.closures} of {found.candidates} closures believed, sigma at the end {facts.sigma_end_m:.2f} m"
-        f"{unchanged}",
-        highlight=False,
-    )
-    for note in (*found.notes, *facts.notes):
+    out.print(f"[bold]{escape(facts.session)}[/]: sigma at the end {facts.sigma_end_m:.2f} m", highlight=False)
+    for note in facts.notes:
         out.print(f"  {escape(note)}", highlight=False)
-    shown = {PAGE: "the graph: what was believed, and lines to correct it", CLOSURES: "every candidate, and why"}
-    for name, meaning in (shown | facts.files).items():
-        out.print(f"  {escape(str(done.folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)
+    _tell_files(done.folder, facts.files)
+
+
+def _tell_files(folder: Path, files: Mapping[str, str]) -> None:
+    for name, meaning in files.items():
+        console().print(f"  {escape(str(folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)

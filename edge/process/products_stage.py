@@ -172,7 +172,7 @@ class ProductsStage:
         )
         name = "map_local.laz" if walk.placement is None else "map.laz"
         with shelf.put(name, f"points in {shelf.facts.crs}") as path:
-            shelf.facts.points = write_laz(path, source, advance)
+            shelf.facts.points = write_laz(path, [source], advance)
 
 
 def _georeference(site: Site, geoid: Geoid) -> Georeference:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -21,11 +23,14 @@ from edge.validation.files import recording_files
 from pipeline.refinement.constraints import Constraints, read_constraints
 from pipeline.refinement.errors import RefinementError
 
+if TYPE_CHECKING:
+    from edge.process.refinement_stage import Given
+
 FOLDER = "refined"
 """In the folder of the products."""
 CONSTRAINTS = "constraints.toml"
 """The analyst's, in that folder; read where it is there and no other is named."""
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,69 +52,82 @@ def refine(
     """Process what is not processed yet, then refine. EdgeError, FormatError for constraints that cannot be used."""
     watch = watch or Watch()
     folder = task.folder / FOLDER
-    given = constraints or (folder / CONSTRAINTS if (folder / CONSTRAINTS).exists() else None)
-    asked = _constraints(given)
+    asked = constraints_of(folder, constraints)
     done = process(task, config, watch, load)
-    first = Checkpoint(task.folder / "work")
     folder.mkdir(exist_ok=True)
     with alone(folder / "work"):
-        work = _Work(task, config, asked, watch, first, Checkpoint(folder / "work"), folder)
-        redone = work.run()
+        ours = Checkpoint(folder / "work")
+        work = Work(task, config, watch, ours, folder, ours.folder / "refinement")
+        key = key_of(_FORMAT, __version__, work.first.key("fusion"), config.refinement, asked)
+        redone = work.stage("refinement", key, lambda _: _solve(work, asked))
+        redone += work.rest(key)
     return Refined(folder, read_facts(folder), (*done.redone, *redone))
 
 
+def _solve(work: Work, constraints: Constraints) -> None:
+    with told(work.task.session):
+        from edge.process.refinement_stage import solve, write_refined  # noqa: PLC0415 - GTSAM
+
+        given = [work.given()]
+        for found in solve(given, work.config.refinement, constraints, work.watch.advance):
+            write_refined(found, given, work.output, f"mapforest {__version__}")
+
+
 @dataclass(frozen=True)
-class _Work:
+class Work:
+    """One session between its placement and its products. placement: the folder that has it. name: of the session where
+    several are worked on in one folder."""
+
     task: Task
     config: Config
-    constraints: Constraints
     watch: Watch
-    first: Checkpoint
-    """Of `process`."""
     checkpoint: Checkpoint
     output: Path
+    placement: Path
+    name: str = ""
+
+    @property
+    def first(self) -> Checkpoint:
+        """Of `process`."""
+        return Checkpoint(self.task.folder / "work")
 
     @property
     def places(self) -> Places:
         """The placement and what follows from it are ours."""
         theirs, ours = self.first.folder, self.checkpoint.folder
-        return Places(theirs / "odometry", ours / "refinement", theirs / "detection", ours / "grounding")
+        return Places(theirs / "odometry", self.placement, theirs / "detection", ours / self._named("grounding"))
 
-    def run(self) -> list[str]:
-        settings, redone = self.config.refinement, []
-        key = key_of(_FORMAT, __version__, self.first.key("fusion"), settings, self.constraints)
-        redone += self._stage("refinement", key, self._refinement)
-        detection = self.first.key("detection") if self.config.detection.model else ""
+    def given(self) -> Given:
+        """As the graph wants it."""
+        from edge.process.refinement_stage import Given  # noqa: PLC0415 - GTSAM
+
+        antenna = msgspec.json.decode((self.places.odometry / ANTENNA).read_bytes(), type=tuple[float, float, float])
+        fusion = msgspec.structs.replace(self.config.fusion, antenna_m=antenna)
+        prints = tuple(fingerprint(recording_files(self.task.targets)))
+        return Given(self.task.session, prints, self.places.odometry, self.placement, self.output, fusion)
+
+    def rest(self, key: str) -> list[str]:
+        """Grounding and products, of a placement with this key; the stages that had to be done."""
+        redone, detection = [], self.first.key("detection") if self.config.detection.model else ""
         if detection:
             detection = key_of(key, detection, self.config.grounding)
-            redone += self._stage("grounding", detection, self._grounding)
+            redone += self.stage(self._named("grounding"), detection, self._grounding)
         last = key_of(key, detection, self.config.products, self.task.session)
-        redone += self._stage("products", last, self._products, self.output / PRODUCTS_JSON)
-        return [f"{FOLDER}/{name}" for name in redone]
+        redone += self.stage(self._named("products"), last, self._products, self.output / PRODUCTS_JSON)
+        return redone
 
-    def _stage(self, name: str, key: str, run: Callable[[Path], None], *outputs: Path) -> list[str]:
+    def stage(self, name: str, key: str, run: Callable[[Path], None], *outputs: Path) -> list[str]:
+        """Its name, where it had to be done."""
         done = self.checkpoint.done(name, key, outputs)
         self.watch.stage(f"{FOLDER}: {name}", done=done)
         if done:
             return []
         run(self.checkpoint.begin(name))
         self.checkpoint.finish(name, key)
-        return [name]
+        return [f"{FOLDER}/{name}"]
 
-    def _refinement(self, folder: Path) -> None:
-        try:
-            from edge.process.refinement_stage import RefinementFacts, RefinementStage  # noqa: PLC0415 - GTSAM
-
-            antenna = msgspec.json.decode(
-                (self.places.odometry / ANTENNA).read_bytes(), type=tuple[float, float, float]
-            )
-            fusion = msgspec.structs.replace(self.config.fusion, antenna_m=antenna)
-            prints = tuple(fingerprint(recording_files(self.task.targets)))
-            facts = RefinementFacts(f"mapforest {__version__}", prints, self.config.refinement, self.constraints)
-            stage = RefinementStage(self.places.odometry, self.output, fusion, self.config.refinement, self.constraints)
-            stage.run(folder, facts, self.watch.advance)
-        except RefinementError as error:
-            raise EdgeError(f"{self.task.session}: {error}") from error
+    def _named(self, stage: str) -> str:
+        return f"{stage} {self.name}" if self.name else stage
 
     def _grounding(self, folder: Path) -> None:
         ground(self.task, self.config, self.places, folder, self.watch.advance)
@@ -118,10 +136,21 @@ class _Work:
         hand_out(self.task, self.config, self.places, self.output, self.watch.advance)
 
 
-def _constraints(path: Path | None) -> Constraints:
+def constraints_of(folder: Path, named: Path | None) -> Constraints:
+    """The analyst's: of a file, or of the one in the folder of the products. FormatError."""
+    path = named or (folder / CONSTRAINTS if (folder / CONSTRAINTS).exists() else None)
     if path is None:
         return Constraints()
     try:
         return read_constraints(path)
     except RefinementError as error:
         raise FormatError(str(error)) from error
+
+
+@contextmanager
+def told(of: str) -> Iterator[None]:
+    """What the refinement refuses, as an EdgeError."""
+    try:
+        yield
+    except RefinementError as error:
+        raise EdgeError(str(error) if str(error).startswith(of) else f"{of}: {error}") from error

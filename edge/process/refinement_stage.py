@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,22 +16,24 @@ from pipeline.products.tum import write_tum
 from pipeline.refinement.config import RefinementConfig
 from pipeline.refinement.constraints import Constraints
 from pipeline.refinement.page import write_page
-from pipeline.refinement.refine import Refined
-from pipeline.refinement.refine import refine as refine_session
-from pipeline.refinement.solver import Problem
+from pipeline.refinement.refine import Refined, refine
+from pipeline.refinement.session import Problem, Session
+from pipeline.refinement.solver import Solution
 from pipeline.refinement.spread import corrected, placement
 from pipeline.refinement.submaps import read_submaps
 from pipeline.refinement.table import write_closures
 
 REFINEMENT, CLOSURES, PAGE, LOCAL = "refinement.json", "closures.csv", "refinement.html", "trajectory_refined.tum"
+MADE = (REFINEMENT, CLOSURES, PAGE)
 
 
 class RefinementFacts(msgspec.Struct):
     """What was done, for people and programs."""
 
     software: str
+    sessions: tuple[str, ...]
     recording: tuple[tuple[str, int, str], ...]
-    """Name, size, digest of each file."""
+    """Name, size, digest of each file, of one session after the other."""
     config: RefinementConfig
     constraints: Constraints
     keyframes: int = 0
@@ -40,40 +42,65 @@ class RefinementFacts(msgspec.Struct):
     fixes: int = 0
     fixes_used: int = 0
     sigma_scale: tuple[float, ...] = ()
-    """By which the receiver's own sigmas had to be multiplied: RTK fixed, float, others."""
+    """By which the receiver's own sigmas had to be multiplied: RTK fixed, float, others, and so for each session."""
     candidates: int = 0
     closures: int = 0
+    between_sessions: int = 0
+    """Of the closures."""
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class RefinementStage:
-    """odometry: the folder of that stage. output: where the list and the page for people go."""
+class Given:
+    """One session: its recording's name and files, where its odometry lies, and where its placement goes; `own`: where
+    what is its own goes for people."""
 
+    name: str
+    recording: tuple[tuple[str, int, str], ...]
     odometry: Path
-    output: Path
+    placement: Path
+    own: Path
     fusion: FusionConfig
-    config: RefinementConfig
-    constraints: Constraints
 
-    def run(self, folder: Path, facts: RefinementFacts, advance: Callable[[float], None]) -> None:
-        """Write the placement in the form of the fusion's. RefinementError."""
+    def session(self) -> Session:
+        """As the refinement takes it."""
         track, fixes = read_track(self.odometry / TRACK), read_fixes(self.odometry / FIXES)
-        problem = Problem(track, fixes, self.fusion, self.config, self.constraints)
-        found = refine_session(problem, read_submaps(self.odometry / SUBMAPS), advance)
-        solved = found.solution
-        fused = FusionFacts(fixes=len(fixes), why=_why_not(len(fixes)))
-        placed = placement(track, solved)
-        if placed is not None:
-            write_placement(folder / PLACEMENT, placed)
-            fused = FusionFacts(True, "", len(fixes), placed.datum)
-        else:
-            write_tum(self.output / LOCAL, track["stamp_ns"], *corrected(track, solved))
-        (folder / FACTS).write_bytes(msgspec.json.encode(fused))
-        write_closures(self.output / CLOSURES, found)
-        _count(facts, found)
-        write_page(self.output / PAGE, found)
-        (self.output / REFINEMENT).write_bytes(msgspec.json.format(msgspec.json.encode(facts), indent=2) + b"\n")
+        return Session(track, fixes, self.fusion, read_submaps(self.odometry / SUBMAPS), self.name)
+
+
+def solve(
+    given: Sequence[Given], config: RefinementConfig, constraints: Constraints, advance: Callable[[float], None]
+) -> list[Refined]:
+    """Sessions together as far as they belong together. RefinementError."""
+    sessions = tuple(one.session() for one in given)
+    return refine(Problem(sessions, config, constraints), advance)
+
+
+def write_refined(found: Refined, given: Sequence[Given], output: Path, software: str) -> RefinementFacts:
+    """The placement of each session in the form of the fusion's; list, page and facts of all for people in `output`."""
+    names = found.problem.names
+    members = [next(one for one in given if one.name == name) for name in names]
+    for number, one in enumerate(members):
+        _write_placement(one, found.problem.sessions[number], found.solution.of(number))
+    write_closures(output / CLOSURES, found)
+    write_page(output / PAGE, found)
+    prints = tuple(print_ for one in members for print_ in one.recording)
+    facts = RefinementFacts(software, tuple(names), prints, found.problem.config, found.problem.constraints)
+    _count(facts, found)
+    (output / REFINEMENT).write_bytes(msgspec.json.format(msgspec.json.encode(facts), indent=2) + b"\n")
+    return facts
+
+
+def _write_placement(one: Given, session: Session, solved: Solution) -> None:
+    fused = FusionFacts(fixes=len(session.fixes), why=_why_not(len(session.fixes)))
+    (one.own / LOCAL).unlink(missing_ok=True)
+    placed = placement(session.track, solved)
+    if placed is not None:
+        write_placement(one.placement / PLACEMENT, placed)
+        fused = FusionFacts(True, "", len(session.fixes), placed.datum)
+    else:
+        write_tum(one.own / LOCAL, session.track["stamp_ns"], *corrected(session.track, solved))
+    (one.placement / FACTS).write_bytes(msgspec.json.encode(fused))
 
 
 def _count(facts: RefinementFacts, found: Refined) -> None:
@@ -83,6 +110,8 @@ def _count(facts: RefinementFacts, found: Refined) -> None:
         facts.fixes, facts.fixes_used = len(solved.fixes), int(solved.judged.used.sum())
         facts.sigma_scale = tuple(round(scale, 2) for scale in solved.judged.scale.tolist())
     facts.candidates, facts.closures = len(found.verdicts), len(solved.closures)
+    of = solved.frames.session
+    facts.between_sessions = sum(int(of[one.a] != of[one.b]) for one in solved.closures)
     facts.notes = tuple(found.notes)
 
 

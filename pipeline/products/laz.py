@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipeline.products.earth import Site
 from pipeline.products.findings import Evidence, PointEvidence
-from pipeline.products.tiles import Tile, read_tile, tiles
+from pipeline.products.tiles import read_tile, tiles
 from pipeline.products.track import Placement
 
 SCALE_M = 0.001
@@ -51,18 +51,21 @@ class MapSource:
     heights: str = "heights above the WGS 84 ellipsoid"
     evidence: Evidence | None = None
     """Of a detector: without it the points carry no heat, label and count."""
+    number: int = 0
+    """Of the session among several in one file: the point source ID."""
 
 
-def write_laz(path: Path, source: MapSource, advance: Callable[[float], None]) -> int:
-    """Write to `path`; returns the number of points. One tile is in memory at a time."""
-    found = tiles(source.tiles)
-    site = Site(source.placement.datum) if source.placement is not None else None
+def write_laz(path: Path, sources: Sequence[MapSource], advance: Callable[[float], None]) -> int:
+    """Write to `path`; returns the number of points. One tile is in memory at a time. All sources have one datum."""
+    found = [(source, tile) for source in sources for tile in tiles(source.tiles)]
+    first = sources[0].placement
+    site = Site(first.datum) if first is not None else None
     count = 0
-    header = _header(source, site, found)
+    header = _header(sources, site)
     with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
-        for number, tile in enumerate(found):
+        for number, (source, tile) in enumerate(found):
             points = read_tile(source.tiles, tile, source.voxel_m)
-            told = source.evidence(tile, points) if source.evidence is not None else None
+            told = source.evidence(tile, points) if source.evidence is not None and _with_evidence(sources) else None
             for start in range(0, len(points), _AT_ONCE):
                 some = slice(start, start + _AT_ONCE)
                 record = _record(points[some], header, source, site)
@@ -74,23 +77,27 @@ def write_laz(path: Path, source: MapSource, advance: Callable[[float], None]) -
     return count
 
 
-def _header(source: MapSource, site: Site | None, found: list[Tile]) -> laspy.LasHeader:
+def _header(sources: Sequence[MapSource], site: Site | None) -> laspy.LasHeader:
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales = np.full(3, SCALE_M)
     header.offsets = np.zeros(3)
-    if site is not None and found:
-        assert source.placement is not None
+    if site is not None:
         header.offsets = np.floor(site.utm(np.zeros((1, 3)))[0])
     header.generating_software = "mapforest"
     header.system_identifier = "mapforest LiDAR map"
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
-    header.add_extra_dims([*_ALWAYS, *(_OF_EVIDENCE if source.evidence is not None else ())])
+    header.add_extra_dims([*_ALWAYS, *(_OF_EVIDENCE if _with_evidence(sources) else ())])
     _leave_bounds_open(header)
-    about = f"session {source.session}; " + (source.heights if site else _LOCAL)
+    names = [f"{one.session} (point source {one.number})" if one.number else one.session for one in sources]
+    about = f"session {', '.join(names)}; " + (sources[0].heights if site else _LOCAL)
     header.vlrs.append(laspy.VLR("LASF_Spec", 3, "Text Area Description", about.encode()[:65_000]))
     if site is not None:
         header.add_crs(site.crs)
     return header
+
+
+def _with_evidence(sources: Sequence[MapSource]) -> bool:
+    return all(source.evidence is not None for source in sources)
 
 
 def _leave_bounds_open(header: laspy.LasHeader) -> None:
@@ -113,6 +120,7 @@ def _record(
     record.return_number[:] = 1
     record.number_of_returns[:] = 1
     record.gps_time = adjusted_gps_s(source.stamps_ns[sweeps])
+    record.point_source_id[:] = source.number
     record["sweep"] = points["sweep"]
     record["sigma_m"] = source.sigma_m[sweeps].astype(np.float32)
     return record

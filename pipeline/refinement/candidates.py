@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +22,8 @@ _DIRECTIONS = 6
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Submaps a < b by number; sigma_m of where they lie to each other. guess: (4, 4) of b from a, or None: as the
-    trajectory has it."""
+    """Submaps a < b by number, those of all sessions counted on; sigma_m of where they lie to each other. guess: (4, 4)
+    of b from a, or None: as the trajectory has it."""
 
     a: int
     b: int
@@ -33,28 +33,34 @@ class Candidate:
 
 
 def candidates(
-    submaps: list[Submap], frames: Keyframes, poses: Poses, covariance: Array, config: ClosureConfig
+    keys: Sequence[int], frames: Keyframes, poses: Poses, covariance: Array, config: ClosureConfig
 ) -> Iterator[Candidate]:
-    """The nearest ones of each submap. covariance: (m, 6, 6) of the keyframes."""
-    keys = keys_of(submaps, frames)
-    places, way_m = poses.positions_m[keys], frames.travelled_m[keys]
+    """The nearest ones of each submap: some of its own session, one of each other.
+
+    keys: the keyframe that each submap hangs on. covariance: (m, 6, 6).
+    """
+    places, way_m, session = poses.positions_m[keys], frames.travelled_m[keys], frames.session[keys]
     sigma = horizontal_sigma_m(covariance)[keys]
-    for b in range(len(submaps)):
+    for b in range(len(keys)):
         apart = np.linalg.norm(places[:b, :2] - places[b, :2], axis=1)
         unsure = np.hypot(sigma[:b], sigma[b])
         near = apart < np.minimum(config.reach_m + _SURE * unsure, config.most_m)
-        near &= way_m[b] - way_m[:b] > config.apart_m
-        found = np.flatnonzero(near)
-        for a in found[np.argsort(apart[found], kind="stable")][: config.each].tolist():
-            yield Candidate(a, b, float(apart[a]), float(unsure[a]))
+        other = session[:b] != session[b]
+        near &= other | (way_m[b] - way_m[:b] > config.apart_m)
+        for number in range(session[b] + 1):
+            found = np.flatnonzero(near & (session[:b] == number))
+            most = config.each if number == session[b] else 1
+            for a in found[np.argsort(apart[found], kind="stable")][:most].tolist():
+                yield Candidate(a, b, float(apart[a]), float(unsure[a]))
 
 
-def keys_of(submaps: list[Submap], frames: Keyframes) -> list[int]:
-    """The keyframe that each submap hangs on: the one nearest to its middle."""
-    middles = np.array([submap.middle for submap in submaps])
-    after = np.clip(np.searchsorted(frames.index, middles), 1, len(frames) - 1)
-    earlier = middles - frames.index[after - 1] < frames.index[after] - middles
-    return [int(k) for k in np.where(earlier, after - 1, after)]
+def keys_of(submaps: Sequence[Sequence[Submap]], frames: Keyframes) -> list[int]:
+    """The keyframe that each submap of each session hangs on: the one nearest to its middle."""
+    found = []
+    for number, own in enumerate(submaps):
+        mine = np.flatnonzero(frames.session == number)
+        found += [int(mine[np.argmin(np.abs(frames.index[mine] - submap.middle))]) for submap in own]
+    return found
 
 
 def guesses(expected: Array, sigma_m: float) -> list[Array]:

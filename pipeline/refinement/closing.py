@@ -11,12 +11,11 @@ import numpy as np
 from pipeline.estimates import Array
 from pipeline.refinement.candidates import Candidate, candidates, guesses, keys_of
 from pipeline.refinement.closure import Closure
-from pipeline.refinement.config import ClosureConfig
-from pipeline.refinement.constraints import Constraints, Guess, Pair
-from pipeline.refinement.keyframes import Keyframes
+from pipeline.refinement.constraints import Guess, Pair, number_of
 from pipeline.refinement.registration import Cloud, Registered, register
+from pipeline.refinement.session import Problem
 from pipeline.refinement.solver import Solution
-from pipeline.refinement.submaps import Submap
+from pipeline.refinement.starts import levelled, pose_of, turned_round
 
 FORBIDDEN, BY_HAND = "forbidden by the constraints", "accepted by the constraints"
 _CLOUDS = 40
@@ -41,17 +40,19 @@ class Verdict:
 
 
 class Closing:
-    """The submaps of one session, against its trajectory so far."""
+    """The submaps of all sessions, against their trajectories so far."""
 
-    def __init__(self, submaps: list[Submap], solved: Solution, config: ClosureConfig, asked: Constraints) -> None:
-        self._submaps, self._solved, self._config, self._asked = submaps, solved, config, asked
-        self._keys = keys_of(submaps, solved.frames) if submaps else []
+    def __init__(self, problem: Problem, solved: Solution) -> None:
+        self._submaps = [submap for session in problem.sessions for submap in session.submaps]
+        self._solved, self._names = solved, problem.names
+        self._config, self._asked = problem.config.closures, problem.constraints
+        self._keys = keys_of([session.submaps for session in problem.sessions], solved.frames)
         self._clouds: dict[int, Cloud] = {}
 
     def verdicts(self, advance: Callable[[float], None]) -> list[Verdict]:
         """Of all candidates, the analyst's among them."""
         solved = self._solved
-        found = list(candidates(self._submaps, solved.frames, solved.poses, solved.covariance, self._config))
+        found = list(candidates(self._keys, solved.frames, solved.poses, solved.covariance, self._config))
         found += [self._guessed(guess) for guess in self._asked.closure]
         judged = []
         for k, candidate in enumerate(found):
@@ -110,28 +111,29 @@ class Closing:
         return float(off @ np.linalg.solve(spread, off))
 
     def _guessed(self, guess: Guess) -> Candidate:
-        frames = self._solved.frames
-        a, b = (self._submap_at(second) for second in sorted((guess.a_s, guess.b_s)))
-        c, s = math.cos(math.radians(guess.yaw_deg)), math.sin(math.radians(guess.yaw_deg))
-        pose = np.array([[c, -s, 0, guess.x_m], [s, c, 0, guess.y_m], [0, 0, 1, guess.z_m], [0, 0, 0, 1]], float)
-        pose = np.linalg.inv(pose) if guess.a_s > guess.b_s else pose
-        ends = [
-            _relative(frames, key, second)
-            for key, second in zip((self._keys[a], self._keys[b]), sorted((guess.a_s, guess.b_s)), strict=True)
-        ]
-        return Candidate(a, b, 0.0, 1.0, ends[0] @ pose @ np.linalg.inv(ends[1]))
+        if self._submap_at(guess.a, guess.a_s) > self._submap_at(guess.b, guess.b_s):
+            guess = turned_round(guess)
+        a, b = self._submap_at(guess.a, guess.a_s), self._submap_at(guess.b, guess.b_s)
+        from_a, from_b = self._seen_from(a, guess.a, guess.a_s), self._seen_from(b, guess.b, guess.b_s)
+        return Candidate(a, b, 0.0, 1.0, from_a @ pose_of(guess) @ np.linalg.inv(from_b))
 
-    def _submap_at(self, second: float) -> int:
-        seconds = [abs(self._second(key) - second) for key in self._keys]
-        return int(np.argmin(seconds))
+    def _submap_at(self, name: str, second: float) -> int:
+        number, frames = number_of(name, self._names), self._solved.frames
+        away = [abs(frames.seconds[key] - second) if frames.session[key] == number else math.inf for key in self._keys]
+        return int(np.argmin(away))
 
     def _named(self, candidate: Candidate, pairs: Sequence[Pair]) -> bool:
         ends = {candidate.a, candidate.b}
-        return any({self._submap_at(pair.a_s), self._submap_at(pair.b_s)} == ends for pair in pairs)
+        return any({self._submap_at(pair.a, pair.a_s), self._submap_at(pair.b, pair.b_s)} == ends for pair in pairs)
 
-    def _second(self, key: int) -> float:
-        stamps = self._solved.frames.stamps_ns
-        return float(stamps[key] - stamps[0]) / 1e9
+    def _seen_from(self, submap: int, name: str, second: float) -> Array:
+        """(4, 4) where the carrier was at a time, levelled, as seen from the keyframe of a submap, by the odometry."""
+        frames, number = self._solved.frames, number_of(name, self._names)
+        began = frames.stamps_ns[frames.begins[number]]
+        other = int(frames.nearest(np.array([began + round(second * 1e9)]), number)[0])
+        there, here = levelled(frames.rotations[other], frames.positions_m[other]), np.eye(4)
+        here[:3, :3], here[:3, 3] = frames.rotations[self._keys[submap]], frames.positions_m[self._keys[submap]]
+        return np.asarray(np.linalg.inv(here) @ there)
 
     def _pose(self, key: int) -> Array:
         pose = np.eye(4)
@@ -146,17 +148,6 @@ class Closing:
             points = self._submaps[submap].points() - frames.positions_m[key]
             self._clouds[submap] = Cloud(points @ frames.rotations[key])
         return self._clouds[submap]
-
-
-def _relative(frames: Keyframes, key: int, second: float) -> Array:
-    """(4, 4) where the carrier was at a time, levelled, as seen from a keyframe."""
-    other = int(frames.nearest(np.array([frames.stamps_ns[0] + round(second * 1e9)]))[0])
-    yaw = math.atan2(frames.rotations[other][1, 0], frames.rotations[other][0, 0])
-    there, here = np.eye(4), np.eye(4)
-    there[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
-    there[:3, 3] = frames.positions_m[other]
-    here[:3, :3], here[:3, 3] = frames.rotations[key], frames.positions_m[key]
-    return np.asarray(np.linalg.inv(here) @ there)
 
 
 def _upright(covariance: Array, rotation: Array) -> Array:

@@ -1,9 +1,13 @@
-"""What the analyst knows better, in a TOML file. Times are seconds since the first pose, as the page shows them."""
+"""What the analyst knows better, in a TOML file. Times are seconds since the first pose, as the page shows them.
+
+Where several sessions are refined together, each time says whose it is: `a` and `b` beside `a_s` and `b_s`, `session`
+beside all others.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -29,6 +33,8 @@ class Pair(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     a_s: float
     b_s: float
+    a: str = ""
+    b: str = ""
 
 
 class Guess(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -41,6 +47,8 @@ class Guess(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     y_m: float = 0.0
     z_m: float = 0.0
     yaw_deg: float = 0.0
+    a: str = ""
+    b: str = ""
 
 
 class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,6 +56,7 @@ class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     from_s: float
     to_s: float
+    session: str = ""
 
 
 class Pin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -59,6 +68,7 @@ class Pin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     height_m: float
     sigma_m: Positive = 0.05
     arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    session: str = ""
 
 
 class Constraints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,16 +80,31 @@ class Constraints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     drop_gnss: tuple[Stretch, ...] = ()
     pin: tuple[Pin, ...] = ()
 
-    def times_s(self) -> Iterable[float]:
-        """All that are named."""
-        for pair in (*self.accept, *self.forbid):
-            yield from (pair.a_s, pair.b_s)
-        for guess in self.closure:
-            yield from (guess.a_s, guess.b_s)
+    def times_s(self) -> Iterable[tuple[str, float]]:
+        """All that are named: session, seconds."""
+        pairs: list[Pair | Guess] = [*self.accept, *self.forbid, *self.closure]
+        for pair in pairs:
+            yield from ((pair.a, pair.a_s), (pair.b, pair.b_s))
         for stretch in self.drop_gnss:
-            yield from (stretch.from_s, stretch.to_s)
+            yield from ((stretch.session, stretch.from_s), (stretch.session, stretch.to_s))
         for pin in self.pin:
-            yield pin.at_s
+            yield pin.session, pin.at_s
+
+    def about(self, names: set[str]) -> Constraints:
+        """What concerns these sessions and no other. Nothing is taken away that names no session."""
+        known = names | {""}
+        return Constraints(
+            tuple(one for one in self.accept if {one.a, one.b} <= known),
+            tuple(one for one in self.forbid if {one.a, one.b} <= known),
+            tuple(one for one in self.closure if {one.a, one.b} <= known),
+            tuple(one for one in self.drop_gnss if one.session in known),
+            tuple(one for one in self.pin if one.session in known),
+        )
+
+
+def number_of(name: str, names: Sequence[str]) -> int:
+    """Which session is meant: the only one, where no name is given."""
+    return list(names).index(name) if name else 0
 
 
 def read_constraints(path: Path) -> Constraints:
@@ -90,32 +115,53 @@ def read_constraints(path: Path) -> Constraints:
         raise ConstraintsRefused(f"{path}: {error}; docs/refinement.md has every key with an example") from error
 
 
-def check(constraints: Constraints, duration_s: float) -> None:
-    """ConstraintsRefused where they contradict each other, or speak of another time than the session's."""
-    for second in constraints.times_s():
+def check(constraints: Constraints, durations_s: Mapping[str, float]) -> None:
+    """ConstraintsRefused where they contradict each other, or speak of other sessions or times than there are.
+
+    durations_s: of each session, by name.
+    """
+    for name, second in constraints.times_s():
+        duration_s = _duration_s(name, durations_s)
         if not 0.0 <= second <= duration_s:
-            raise ConstraintsRefused(f"a constraint at {second:g} s: the session lasts from 0 to {duration_s:.1f} s")
+            raise ConstraintsRefused(
+                f"a constraint at {second:g} s: {name or 'the session'} lasts from 0 to {duration_s:.1f} s"
+            )
     for stretch in constraints.drop_gnss:
         if stretch.from_s >= stretch.to_s:
             raise ConstraintsRefused(
                 f"drop_gnss from {stretch.from_s:g} s to {stretch.to_s:g} s: ends before it begins"
             )
-    both = {(pair.a_s, pair.b_s) for pair in constraints.accept} & {(pair.a_s, pair.b_s) for pair in constraints.forbid}
+    both = {_ends(pair) for pair in constraints.accept} & {_ends(pair) for pair in constraints.forbid}
     if both:
+        (a, a_s), (b, b_s) = min(both)
         raise ConstraintsRefused(
-            f"the closure between {min(both)[0]:g} s and {min(both)[1]:g} s: accepted and forbidden"
+            f"the closure between {a} {a_s:g} s and {b} {b_s:g} s: accepted and forbidden".replace("  ", " ")
         )
     _check_pins(constraints.pin)
 
 
-def _check_pins(pins: tuple[Pin, ...]) -> None:
+def _duration_s(name: str, durations_s: Mapping[str, float]) -> float:
+    if not name and len(durations_s) == 1:
+        return next(iter(durations_s.values()))
+    if name not in durations_s:
+        known, said = ", ".join(durations_s), f"of session {name!r}" if name else "that names no session"
+        raise ConstraintsRefused(f"a constraint {said}: there are {known}")
+    return durations_s[name]
 
+
+def _ends(pair: Pair) -> tuple[tuple[str, float], tuple[str, float]]:
+    a, b = sorted(((pair.a, pair.a_s), (pair.b, pair.b_s)))
+    return a, b
+
+
+def _check_pins(pins: tuple[Pin, ...]) -> None:
     for k, one in enumerate(pins):
         datum = Datum(one.latitude_deg, one.longitude_deg, one.height_m)
         for other in pins[:k]:
             apart_m = float(np.linalg.norm(datum.enu(other.latitude_deg, other.longitude_deg, other.height_m)))
             allowed_m = _CONTRADICTED * (one.sigma_m + other.sigma_m)
-            if abs(one.at_s - other.at_s) < _SAME_S and one.arm_m == other.arm_m and apart_m > allowed_m:
+            together = one.session == other.session and abs(one.at_s - other.at_s) < _SAME_S
+            if together and one.arm_m == other.arm_m and apart_m > allowed_m:
                 raise ConstraintsRefused(
                     f"two pins at {other.at_s:g} s and {one.at_s:g} s are {apart_m:.2f} m apart, more than their "
                     f"sigmas allow: one of them is wrong"

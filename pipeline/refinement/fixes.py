@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -21,6 +21,7 @@ from pipeline.products.track import estimate_of
 from pipeline.refinement.config import GnssConfig
 from pipeline.refinement.keyframes import Keyframes
 
+KIND_NAMES = ("fixed", "float", "other")
 MOST_DISHONEST = 10.0
 MEDIAN_CHI2_UP = 0.455
 """Of chi-square with one degree of freedom."""
@@ -32,8 +33,8 @@ UP_RATIO = 0.78
 class Fixes:
     """f fixes that can be placed. stamps_ns: (f,). keyframe: (f,), the nearest; arm_m: (f, 3) of the antenna, in its
     body. odom_m, position_m: (f, 3) of the antenna in `odom`, and in `map` as the receiver says. sigma_m: (f, 3) before
-    any scale. kind: (f,) 0 fixed, 1 float, 2 other. white_share: of sigma that is new with each fix; the rest lasts for
-    correlation_s, or, where that is 0, there is no rest.
+    any scale. kind: (f,) 0 fixed, 1 float, 2 other, and so on for each session's receiver. white_share: of sigma that
+    is new with each fix; the rest lasts for correlation_s, or, where that is 0, there is no rest.
     """
 
     datum: Datum
@@ -50,10 +51,28 @@ class Fixes:
     def __len__(self) -> int:
         return len(self.stamps_ns)
 
+    @property
+    def kinds(self) -> int:
+        """How many there may be."""
+        return len(KIND_NAMES) * (int(self.kind.max(initial=0)) // len(KIND_NAMES) + 1)
+
+    def of(self, session: int, frames: Keyframes) -> npt.NDArray[np.bool_]:
+        """(f,) which of them hang on keyframes of a session."""
+        return np.asarray(frames.session[self.keyframe] == session)
+
+    def seconds(self, frames: Keyframes) -> Array:
+        """(f,) since the first pose of each one's session."""
+        return np.asarray((self.stamps_ns - frames.stamps_ns[frames.begins][frames.session[self.keyframe]]) / 1e9)
+
+    def seen_from(self, datum: Datum) -> Fixes:
+        """The same in the `map` of another datum, whose axes are taken as parallel: 0.01 degrees a kilometre."""
+        places = np.array([datum.enu(*self.datum.geodetic(place)) for place in self.position_m])
+        return replace(self, datum=datum, position_m=places.reshape(-1, 3))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """scale: (3,) of the sigmas, by kind. used: (f,). chi2: (f, 2) of each one's residual, horizontal and vertical."""
+    """scale: (kinds,) of the sigmas. used: (f,). chi2: (f, 2) of each one's residual, horizontal and vertical."""
 
     scale: Array
     used: npt.NDArray[np.bool_]
@@ -89,11 +108,32 @@ def place_fixes(
     )
 
 
+def joined_fixes(parts: Sequence[Fixes | None], begins: Sequence[int]) -> Fixes | None:
+    """Of several sessions, in the `map` of the first that has any; begins: the first keyframe of each."""
+    there = [(k, part) for k, part in enumerate(parts) if part is not None]
+    if not there:
+        return None
+    first = there[0][1]
+    moved = [first if part is first else part.seen_from(first.datum) for _, part in there]
+    return Fixes(
+        first.datum,
+        np.concatenate([part.stamps_ns for part in moved]),
+        np.concatenate([part.keyframe + begins[k] for k, part in there]),
+        np.concatenate([part.arm_m for part in moved]),
+        np.concatenate([part.odom_m for part in moved]),
+        np.concatenate([part.position_m for part in moved]),
+        np.concatenate([part.sigma_m for part in moved]),
+        np.concatenate([part.kind + len(KIND_NAMES) * k for k, part in there]),
+        first.white_share,
+        first.correlation_s,
+    )
+
+
 def judge(fixes: Fixes, residuals_m: Array, config: GnssConfig) -> Judged:
     """By their residuals (f, 3) from the trajectory. Fixes rejected before can come back."""
-    scale = np.ones(3)
+    scale = np.ones(fixes.kinds)
     chi2 = _chi2(residuals_m, fixes.sigma_m)
-    for kind in range(3):
+    for kind in range(fixes.kinds):
         which = fixes.kind == kind
         if config.learn and which.any():
             typical = max(np.median(chi2[which, 0]) / MEDIAN_CHI2, np.median(chi2[which, 1]) / MEDIAN_CHI2_UP)

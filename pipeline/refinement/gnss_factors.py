@@ -56,7 +56,7 @@ def add_fixes(
                 graph.add(gtsam.GPSFactorArm(int(fixes.keyframe[f]), fixes.position_m[f], fixes.arm_m[f], model))
     if fixes.correlation_s:
         lasting = math.sqrt(1.0 - fixes.white_share**2) * sigma
-        for kind in range(3):
+        for kind in range(fixes.kinds):
             _add_process(graph, fixes, used[fixes.kind[used] == kind], lasting)
 
 

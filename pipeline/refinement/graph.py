@@ -18,8 +18,8 @@ from pipeline.refinement.keyframes import Keyframes, Poses
 from pipeline.refinement.library import gtsam
 from pipeline.refinement.pins import Pinned
 
-_LOOSE = (0.5, 100.0)
-"""Sigmas (rad, m) of the first pose where fixes place it."""
+_LOOSE = (0.5, 10.0)
+"""Sigmas (rad, m) of the first pose where fixes or closures place it."""
 _TIGHT = (1e-4, 1e-3)
 _PROBABILITY = 0.99
 """A true closure is believed with."""
@@ -34,18 +34,20 @@ class Graph:
         self._fixes: tuple[Fixes, Judged] | None = None
         self._found = gtsam.Values()
         poses = [_pose(r, p) for r, p in zip(frames.rotations, frames.positions_m, strict=True)]
-        for k, covariance in enumerate(frames.step_covariances(level_rad)):
-            model = gtsam.noiseModel.Gaussian.Covariance(covariance)
-            self._graph.add(gtsam.BetweenFactorPose3(k, k + 1, poses[k].between(poses[k + 1]), model))
+        covariances = frames.step_covariances()
+        for k in frames.steps.tolist():
+            model = gtsam.noiseModel.Gaussian.Covariance(covariances[k])
+            self._graph.add(gtsam.BetweenFactorPose3(k - 1, k, poses[k - 1].between(poses[k]), model))
         level, up = gtsam.noiseModel.Isotropic.Sigma(2, level_rad), gtsam.Unit3(np.array([0.0, 0.0, 1.0]))
         for k, rotation in enumerate(frames.rotations):
             self._graph.add(gtsam.AttitudeFactorPose3(k, up, level, gtsam.Unit3(rotation[2])))
 
     def hold_first(self, start: Poses, *, firmly: bool) -> None:
-        """firmly: nothing else says where the way lies."""
-        turn, place = _TIGHT if firmly else _LOOSE
-        model = gtsam.noiseModel.Diagonal.Sigmas(np.array([turn] * 3 + [place] * 3))
-        self._graph.add(gtsam.PriorFactorPose3(0, _pose(start.rotations[0], start.positions_m[0]), model))
+        """Of each session. firmly: nothing else says where the first one lies."""
+        for number, k in enumerate(self._frames.begins.tolist()):
+            turn, place = _TIGHT if firmly and not number else _LOOSE
+            model = gtsam.noiseModel.Diagonal.Sigmas(np.array([turn] * 3 + [place] * 3))
+            self._graph.add(gtsam.PriorFactorPose3(k, _pose(start.rotations[k], start.positions_m[k]), model))
 
     def add_fixes(self, fixes: Fixes, judged: Judged, config: GnssConfig, weights: Array | None = None) -> None:
         """Those used; once. weights: (f, 2), horizontal and vertical, in place of the robust kernel."""

@@ -1,9 +1,10 @@
-"""The odometry's track as a chain: some of its poses, and how well each is known from the one before."""
+"""The odometry's tracks as chains, one a session: some poses, and how well each is known from the one before."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,12 +19,14 @@ _LEAST_STEP_M = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keyframes:
-    """m of a track's n poses, `base_link` in `odom`.
+    """m poses of one track or several, `base_link` in each one's own `odom`.
 
-    index: (m,) into the track. stamps_ns: (m,). positions_m: (m, 3). rotations: (m, 3, 3). travelled_m: (m,).
-    drifted: (m - 1, 4) variance of yaw (rad^2), x, y, z (m^2, `odom`) that the odometry gathered on each step.
+    session: (m,) which track, rising. index: (m,) into it. stamps_ns: (m,). positions_m: (m, 3). rotations: (m, 3, 3).
+    travelled_m: (m,). drifted: (m, 4) variance of yaw (rad^2), x, y, z (m^2, `odom`) that the odometry gathered on the
+    step that led to each; of no meaning for the first of a session.
     """
 
+    session: npt.NDArray[np.int64]
     index: npt.NDArray[np.int64]
     stamps_ns: npt.NDArray[np.int64]
     positions_m: Array
@@ -34,27 +37,59 @@ class Keyframes:
     def __len__(self) -> int:
         return len(self.index)
 
-    def step_covariances(self, level_rad: float) -> Array:
-        """(m - 1, 6, 6) of each pose as seen from the one before: rotation (rad), then position (m), both in the body's
-        axes of the later one. Roll and pitch do not drift: gravity holds them by `level_rad`."""
-        turns = self.rotations[1:]
-        up = turns[:, 2, :, None] * turns[:, 2, None, :]
+    @property
+    def begins(self) -> npt.NDArray[np.int64]:
+        """(s,) the first keyframe of each session."""
+        return np.flatnonzero(np.diff(self.session, prepend=-1))
+
+    @property
+    def steps(self) -> npt.NDArray[np.int64]:
+        """(m - s,) the keyframes that have one before them in their session."""
+        return np.flatnonzero(np.diff(self.session, prepend=-1) == 0)
+
+    @property
+    def seconds(self) -> Array:
+        """(m,) since the first pose of each one's session."""
+        return np.asarray((self.stamps_ns - self.stamps_ns[self.begins][self.session]) / 1e9)
+
+    def step_covariances(self) -> Array:
+        """(m, 6, 6) of each pose as seen from the one before: rotation (rad), then position (m), both in the body's
+        axes of the later one. Roll and pitch drift no less than yaw does: the odometry's own idea of what is level
+        wanders with it."""
+        turns = self.rotations
         steps = np.zeros((len(turns), 6, 6))
-        steps[:, :3, :3] = self.drifted[:, 0, None, None] * up + level_rad**2 * (np.eye(3) - up)
+        steps[:, :3, :3] = self.drifted[:, 0, None, None] * np.eye(3)
         steps[:, 3:, 3:] = np.einsum("kji,kj,kjl->kil", turns, self.drifted[:, 1:], turns)
         return steps
+
+    @property
+    def log_spread(self) -> float:
+        """Logarithm of the product of all sigmas of all steps."""
+        yaw, *moved = np.log(self.drifted[self.steps]).sum(axis=0)
+        return 0.5 * float(3.0 * yaw + sum(moved))
 
     def drifting(self, scale: float) -> Keyframes:
         """The same, with the drift's sigmas so many times larger."""
         return replace(self, drifted=self.drifted * scale**2)
 
-    def nearest(self, stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        """(k,) the keyframe nearest in time to each stamp (k,)."""
-        after = np.clip(np.searchsorted(self.stamps_ns, stamps_ns), 1, max(len(self) - 1, 1))
+    def of(self, session: int) -> Keyframes:
+        """Those of one session, as if it were the only one."""
+        mine = self.session == session
+        return Keyframes(*(getattr(self, name)[mine] for name in self.__slots__)).numbered(0)
+
+    def numbered(self, session: int) -> Keyframes:
+        """Of one session, under another number."""
+        return replace(self, session=np.full(len(self), session))
+
+    def nearest(self, stamps_ns: npt.NDArray[np.int64], session: int = 0) -> npt.NDArray[np.int64]:
+        """(k,) the keyframe of a session nearest in time to each stamp (k,)."""
+        mine = np.flatnonzero(self.session == session)
+        own_ns = self.stamps_ns[mine]
+        after = np.clip(np.searchsorted(own_ns, stamps_ns), 1, max(len(mine) - 1, 1))
         before = after - 1
-        after = np.minimum(after, len(self) - 1)
-        late = stamps_ns - self.stamps_ns[before] > self.stamps_ns[after] - stamps_ns
-        return np.where(late, after, before)
+        after = np.minimum(after, len(mine) - 1)
+        late = stamps_ns - own_ns[before] > own_ns[after] - stamps_ns
+        return np.asarray(mine[np.where(late, after, before)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,14 +99,20 @@ class Poses:
     positions_m: Array
     rotations: Array
 
+    def turned(self, turn: Array, moved_m: Array) -> Poses:
+        """All of them, rigidly: turn (3, 3), then moved_m (3,)."""
+        return Poses(self.positions_m @ turn.T + moved_m, turn @ self.rotations)
 
-def keyframes(track: npt.NDArray[np.void], config: ChainConfig) -> Keyframes:
+
+def keyframes(track: npt.NDArray[np.void], config: ChainConfig, name: str = "") -> Keyframes:
     """Of a track (n,) of ESTIMATE. NothingToRefine where there are fewer than two."""
     index = _chosen(track, config)
     if len(index) < 2:
-        raise NothingToRefine(f"a track of {len(track)} poses that does not move cannot be refined")
+        of = f"{name}: " if name else ""
+        raise NothingToRefine(f"{of}a track of {len(track)} poses that does not move cannot be refined; leave it out")
     chosen = track[index]
     return Keyframes(
+        np.zeros(len(index), np.int64),
         index,
         chosen["stamp_ns"].astype(np.int64),
         chosen["position_m"],
@@ -79,6 +120,12 @@ def keyframes(track: npt.NDArray[np.void], config: ChainConfig) -> Keyframes:
         chosen["travelled_m"],
         _drifted(chosen, config),
     )
+
+
+def joined(parts: Sequence[Keyframes]) -> Keyframes:
+    """One session after the other."""
+    numbered = [part.numbered(k) for k, part in enumerate(parts)]
+    return Keyframes(*(np.concatenate([getattr(part, name) for part in numbered]) for name in Keyframes.__slots__))
 
 
 def _chosen(track: npt.NDArray[np.void], config: ChainConfig) -> npt.NDArray[np.int64]:
@@ -105,15 +152,15 @@ def _drifted(chosen: npt.NDArray[np.void], config: ChainConfig) -> Array:
     The covariance is of the whole way since the start. What an error of yaw at the start of a step swings its end by is
     not new, so that it is taken off.
     """
-    drifted = np.empty((len(chosen) - 1, 4))
-    floor = np.array([math.radians(config.floor_yaw_deg), *[config.floor_m] * 3]) ** 2
+    drifted = np.ones((len(chosen), 4))
+    floor = np.array([math.radians(config.floor_turn_deg), *[config.floor_m] * 3]) ** 2
     known = [_level_covariance(record) for record in chosen]
     for k, (before, after) in enumerate(itertools.pairwise(chosen)):
         moved = after["position_m"] - before["position_m"]
         carry = np.eye(4)
         carry[1, 0], carry[2, 0] = -moved[1], moved[0]
         grown = np.diag(known[k + 1] - carry @ known[k] @ carry.T)
-        drifted[k] = np.maximum(grown, floor * max(float(np.linalg.norm(moved)), _LEAST_STEP_M))
+        drifted[k + 1] = np.maximum(grown, floor * max(float(np.linalg.norm(moved)), _LEAST_STEP_M))
     return drifted
 
 

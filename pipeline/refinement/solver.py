@@ -1,55 +1,35 @@
-"""The trajectory of one session from its chain, its fixes, its pins, and the closures that are claimed."""
+"""The trajectories of all sessions from their chains, fixes, pins, and the closures that are claimed."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from drivers.messages import GnssFix
 from pipeline.estimates import Array
-from pipeline.gnss.alignment import align
-from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.geodesy import Datum
 from pipeline.refinement.closure import Closure
-from pipeline.refinement.config import RefinementConfig
-from pipeline.refinement.constraints import Constraints
-from pipeline.refinement.fixes import Fixes, Judged, judge, place_fixes
+from pipeline.refinement.fixes import Fixes, Judged, joined_fixes, judge
 from pipeline.refinement.gnss_factors import kernel_weights, log_norm
 from pipeline.refinement.graph import Graph, antennas_m
-from pipeline.refinement.keyframes import Keyframes, Poses, keyframes
-from pipeline.refinement.pins import place_pins
+from pipeline.refinement.keyframes import Keyframes, Poses, joined
+from pipeline.refinement.pins import Pinned, place_pins
+from pipeline.refinement.session import Problem
+from pipeline.refinement.starts import starts
 
 _BELIEVED = 0.5
 """Weight of a closure from which on it is kept."""
 _SETTLED = 0.02
 """Share by which the sigmas of the fixes may still change."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Problem:
-    """What one session brings. track: (n,) of ESTIMATE. Without fixes the way begins where it does in `odom`."""
-
-    track: npt.NDArray[np.void]
-    fixes: Sequence[GnssFix]
-    fusion: FusionConfig
-    config: RefinementConfig
-    constraints: Constraints = field(default_factory=Constraints)
-
-    @property
-    def duration_s(self) -> float:
-        """From the first pose to the last."""
-        stamps = self.track["stamp_ns"]
-        return float(stamps[-1] - stamps[0]) / 1e9 if len(stamps) else 0.0
-
-    def kept_fixes(self) -> list[GnssFix]:
-        """Without the stretches that the analyst dropped."""
-        began = int(self.track["stamp_ns"][0]) if len(self.track) else 0
-        dropped = [(began + round(s.from_s * 1e9), began + round(s.to_s * 1e9)) for s in self.constraints.drop_gnss]
-        return [fix for fix in self.fixes if not any(a <= fix.stamp_ns <= b for a, b in dropped)]
+_CLEANING = 2
+"""Rounds that take wrong fixes out before sigmas are learned: those of RTK fixed, few and good, look ten times too
+small while some of them are 10 m off, and would never be believed again."""
+_TELLING = 0.25
+"""Logarithm of the likelihood, a fix, by which a wider drift must explain the fixes better: receivers err for longer
+and in other ways than the model has it, and a loose chain follows them there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +48,7 @@ class Solution:
     drift_scale: float
     closures: tuple[Closure, ...] = ()
     doubted: tuple[Closure, ...] = ()
+    pins: tuple[Pinned, ...] = ()
 
     @property
     def datum(self) -> Datum | None:
@@ -79,51 +60,66 @@ class Solution:
         """(f, 3) fix less antenna, in `map`."""
         return np.empty((0, 3)) if self.fixes is None else residuals_m(self.fixes, self.poses)
 
+    def of(self, session: int) -> Solution:
+        """The way of one session; fixes and closures stay with all of them."""
+        mine = self.frames.session == session
+        poses = Poses(self.poses.positions_m[mine], self.poses.rotations[mine])
+        return replace(self, frames=self.frames.of(session), poses=poses, covariance=self.covariance[mine])
+
 
 class Solver:
-    """One session. `solve` may be asked again with other closures. NothingToRefine, ConstraintsRefused."""
+    """All sessions. `solve` may be asked again with other closures. NothingToRefine, ConstraintsRefused."""
 
     def __init__(self, problem: Problem) -> None:
         self._config = problem.config
-        frames = keyframes(problem.track, problem.config.chain)
-        kept = problem.kept_fixes()
-        fixes = place_fixes(problem.track, frames, kept, problem.fusion) if kept else None
-        start = None if fixes is None else _placed(frames, fixes, problem.fusion)
-        self._fixes = None if start is None else fixes
-        self._start = start or Poses(frames.positions_m, frames.rotations)
-        datum = None if self._fixes is None else self._fixes.datum
-        self._pins = place_pins(problem.track, frames, problem.constraints.pin, datum)
+        placed = problem.placed()
+        frames = joined([one.frames for one in placed])
+        self._fixes = joined_fixes([one.fixes for one in placed], frames.begins.tolist())
+        self._start = starts(problem, placed)
+        self._pins = place_pins(problem.sessions, frames, problem.constraints.pin, self.datum)
         self._scale = problem.config.chain.drift_scales[0]
+        self._begun: _Fit | None = None
         if self._fixes is not None and len(problem.config.chain.drift_scales) > 1:
-            self._scale = self._likeliest(frames, self._fixes)
+            self._scale, self._begun = self._likeliest(frames, self._fixes)
         self.frames = frames.drifting(self._scale)
+
+    @property
+    def datum(self) -> Datum | None:
+        """Of `map`; None where no fix tells where that is."""
+        return None if self._fixes is None else self._fixes.datum
 
     def solve(self, closures: Sequence[Closure] = ()) -> Solution:
         """With closures, each of which may be wrong."""
-        fit, kept, doubted = self._fit(self.frames, []), list(closures), []
+        fit, kept, doubted = self._fit(self.frames, [], self._begun), list(closures), []
+        self._begun = fit
         if kept:
             weights = self._doubt(fit, kept)
             doubted = [one for one, weight in zip(closures, weights, strict=True) if weight < _BELIEVED]
             kept = [one for one, weight in zip(closures, weights, strict=True) if weight >= _BELIEVED]
             fit = self._fit(self.frames, kept, fit)
         found = (self.frames, fit.poses, fit.graph.covariances(), self._fixes, fit.judged, self._scale)
-        return Solution(*found, tuple(kept), tuple(doubted))
+        return Solution(*found, tuple(kept), tuple(doubted), tuple(self._pins))
 
-    def _likeliest(self, frames: Keyframes, fixes: Fixes) -> float:
-        """Which drift explains the fixes best, of those that the loosest of them leaves in."""
-        scales, used, found = sorted(self._config.chain.drift_scales, reverse=True), None, []
+    def _likeliest(self, frames: Keyframes, fixes: Fixes) -> tuple[float, _Fit]:
+        """The least drift that explains the fixes, of those that all scales leave in, about as well as the best one
+        does; and the way under it. Each begins where the looser one before it ended."""
+        scales, fits = sorted(self._config.chain.drift_scales, reverse=True), list[_Fit]()
         for scale in scales:
-            drifting = frames.drifting(scale)
-            fit = self._fit(drifting, [])
-            assert fit.judged is not None
-            used = fit.judged.used if used is None else used
-            judged = replace(fit.judged, used=used)
-            graph = self._graph(drifting, [])
-            graph.add_fixes(fixes, judged, self._config.gnss)
-            graph.solve(fit.poses)
-            spread = 0.5 * float(np.log(drifting.drifted).sum())
-            found.append(graph.evidence() - spread + log_norm(fixes, judged))
-        return scales[int(np.argmax(found))]
+            fits.append(self._fit(frames.drifting(scale), [], fits[-1] if fits else None))
+        used = np.all([_judged(fit).used for fit in fits], axis=0)
+        found = [
+            self._evidence(frames.drifting(scale), fixes, fit, used) for scale, fit in zip(scales, fits, strict=True)
+        ]
+        enough = max(found) - _TELLING * int(used.sum())
+        chosen = max(k for k, evidence in enumerate(found) if evidence >= enough)
+        return scales[chosen], fits[chosen]
+
+    def _evidence(self, frames: Keyframes, fixes: Fixes, fit: _Fit, used: npt.NDArray[np.bool_]) -> float:
+        judged = replace(_judged(fit), used=used)
+        graph = self._graph(frames, [])
+        graph.add_fixes(fixes, judged, self._config.gnss)
+        graph.solve(fit.poses)
+        return graph.evidence() - frames.log_spread + log_norm(fixes, judged)
 
     def _graph(self, frames: Keyframes, closures: Sequence[Closure]) -> Graph:
         graph = Graph(frames, math.radians(self._config.chain.level_deg))
@@ -140,10 +136,11 @@ class Solver:
         if self._fixes is None:
             return _Fit(graph, graph.solve(poses), None)
         judged = _all_believed(self._fixes) if begun is None or begun.judged is None else begun.judged
-        for _ in range(self._config.gnss.rounds):
+        for k in range(self._config.gnss.rounds):
             graph = self._graph(frames, closures)
-            graph.add_fixes(self._fixes, judged, self._config.gnss)
-            poses, before = graph.solve(poses), judged
+            learned = judged if k >= _CLEANING else replace(judged, scale=np.ones_like(judged.scale))
+            graph.add_fixes(self._fixes, learned, self._config.gnss)
+            poses, before = graph.solve(poses), learned
             judged = judge(self._fixes, residuals_m(self._fixes, poses), self._config.gnss)
             if np.array_equal(before.used, judged.used) and np.allclose(before.scale, judged.scale, rtol=_SETTLED):
                 break
@@ -170,20 +167,10 @@ def residuals_m(fixes: Fixes, poses: Poses) -> Array:
     return np.asarray(fixes.position_m - antennas_m(fixes, poses))
 
 
+def _judged(fit: _Fit) -> Judged:
+    assert fit.judged is not None
+    return fit.judged
+
+
 def _all_believed(fixes: Fixes) -> Judged:
-    return Judged(np.ones(3), np.ones(len(fixes), bool), np.zeros((len(fixes), 2)))
-
-
-def _placed(frames: Keyframes, fixes: Fixes, config: FusionConfig) -> Poses | None:
-    """The whole chain turned and moved to the fixes; None where these cannot tell the heading."""
-    seconds = fixes.stamps_ns / 1e9
-    lasting_s = 2.0 * config.correlation_s
-    share = np.diff(seconds, prepend=seconds[0] - lasting_s) / lasting_s if lasting_s else np.ones(len(seconds))
-    found = align(fixes.odom_m, fixes.position_m, fixes.sigma_m, np.clip(share, 1e-3, 1.0))
-    if not math.degrees(found.yaw_sigma) < config.yaw_known_deg:
-        return None
-    turn = np.array(
-        [[math.cos(found.yaw), -math.sin(found.yaw), 0.0], [math.sin(found.yaw), math.cos(found.yaw), 0.0], [0, 0, 1.0]]
-    )
-    positions = (frames.positions_m - found.centre_odom_m) @ turn.T + found.centre_map_m
-    return Poses(positions, turn @ frames.rotations)
+    return Judged(np.ones(fixes.kinds), np.ones(len(fixes), bool), np.zeros((len(fixes), 2)))

@@ -11,7 +11,7 @@ from pipeline.refinement.solver import Solution
 
 
 def placement(track: npt.NDArray[np.void], solved: Solution) -> Placement | None:
-    """`odom` in `map` at each estimate (n,) of the track; None where fixes do not tell.
+    """`odom` in `map` at each estimate (n,) of the track; None where fixes do not tell. solved: of that session alone.
 
     By yaw and translation: gravity levels `odom`, so that no more is left of roll and pitch than `chain.level_deg`.
     """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pipeline.refinement.refine import Refined
 
-HEADER = ("a_s", "b_s", "believed", "reason", "apart_m", "sigma_m", "overlap", "rival_m", "correction_m")
+HEADER = ("a", "a_s", "b", "b_s", "believed", "reason", "apart_m", "sigma_m", "overlap", "rival_m", "correction_m")
 
 
 def write_closures(path: Path, found: Refined) -> None:
@@ -22,11 +22,12 @@ def write_closures(path: Path, found: Refined) -> None:
 
 def rows(found: Refined) -> Iterator[tuple[str, ...]]:
     """In the order of `HEADER`; empty where nothing was measured."""
-    stamps = found.solution.frames.stamps_ns
+    frames, names = found.solution.frames, found.problem.names
+    seconds = frames.seconds
     for one in found.verdicts:
-        seconds = [f"{(stamps[key] - stamps[0]) / 1e9:.1f}" for key in one.keys]
+        ends = [cell for key in one.keys for cell in (names[frames.session[key]], f"{seconds[key]:.1f}")]
         measured = one.registered
         numbers = [one.candidate.apart_m, one.candidate.sigma_m]
         numbers += [measured.overlap, measured.rival_m, one.correction_m] if measured is not None else [math.nan] * 3
         cells = [f"{number:.3f}" if math.isfinite(number) else "" for number in numbers]
-        yield (*seconds, "yes" if one.sound else "no", one.reason, *cells)
+        yield (*ends, "yes" if one.sound else "no", one.reason, *cells)

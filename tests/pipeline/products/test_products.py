@@ -136,7 +136,7 @@ def source(folder: Path, placement: Placement | None) -> MapSource:
 def test_the_map_is_laz_with_crs_time_intensity_and_sigma(tmp_path):
     yaw = 0.3
     placement = Placement(DATUM, np.array([[5.0, 6.0, 7.0]] * 3), np.full(3, yaw), np.zeros((3, 6, 6)))
-    count = write_laz(tmp_path / "map.laz", source(tmp_path / "tiles", placement), lambda _: None)
+    count = write_laz(tmp_path / "map.laz", [source(tmp_path / "tiles", placement)], lambda _: None)
     read = laspy.read(tmp_path / "map.laz")
     assert (str(read.header.version), read.header.point_format.id, len(read.points)) == ("1.4", 6, count)
     assert read.header.parse_crs().to_epsg() == 32618
@@ -169,7 +169,7 @@ def test_what_the_camera_made_of_each_point_is_in_the_map(tmp_path):
         return PointEvidence(heat, (heat > 0.5).astype(np.uint8), seen)
 
     plain = source(tmp_path / "tiles", None)
-    count = write_laz(tmp_path / "map.laz", replace(plain, evidence=evidence), lambda _: None)
+    count = write_laz(tmp_path / "map.laz", [replace(plain, evidence=evidence)], lambda _: None)
     read = laspy.read(tmp_path / "map.laz")
     assert sum(points for _, points in asked) == count
     assert [tile for tile, _ in asked] == tiles(tmp_path / "tiles")
@@ -180,12 +180,21 @@ def test_what_the_camera_made_of_each_point_is_in_the_map(tmp_path):
     raw = (tmp_path / "map.laz").read_bytes()
     at = raw.index(b"heat\0")
     assert (raw[at - 1], struct.unpack_from("<d", raw, at + 36)) == (0b1, (-1.0,))
-    write_laz(tmp_path / "plain.laz", plain, lambda _: None)
+    write_laz(tmp_path / "plain.laz", [plain], lambda _: None)
     assert "heat" not in laspy.read(tmp_path / "plain.laz").point_format.extra_dimension_names
 
 
+def test_points_of_several_sessions_tell_which_they_are_of(tmp_path):
+    placement = Placement(DATUM, np.zeros((3, 3)), np.zeros(3), np.zeros((3, 6, 6)))
+    first = source(tmp_path / "tiles", placement)
+    count = write_laz(tmp_path / "map.laz", [replace(first, number=1), replace(first, number=2)], lambda _: None)
+    read = laspy.read(tmp_path / "map.laz")
+    assert np.bincount(read.point_source_id).tolist() == [0, count // 2, count // 2]
+    assert b"walk (point source 1), walk (point source 2)" in (tmp_path / "map.laz").read_bytes()
+
+
 def test_a_local_map_has_no_crs_and_says_why(tmp_path):
-    write_laz(tmp_path / "map.laz", source(tmp_path / "tiles", None), lambda _: None)
+    write_laz(tmp_path / "map.laz", [source(tmp_path / "tiles", None)], lambda _: None)
     read = laspy.read(tmp_path / "map.laz")
     assert read.header.parse_crs() is None
     text = next(vlr for vlr in read.header.vlrs if vlr.record_id == 3)

