@@ -58,6 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--lobe", choices=["positive", "absolute"], default="positive", help="of the Laplacian")
     parser.add_argument(
+        "--device",
+        default="cpu",
+        metavar="NAME",
+        help="cuda: score poses by PyTorch on a GPU, for wide searches of nmi",
+    )
+    parser.add_argument(
         "--sessions", action="store_true", help="both are ground maps: any turn, any shift, stems on stems"
     )
     parser.add_argument("--no-merge", action="store_true", help="leave merged.laz out")
@@ -117,7 +123,9 @@ def _task(args: argparse.Namespace) -> Task:
         raise UsageError(
             f"--search {args.search:g} --turn {args.turn:g}: metres above 0, and degrees up to 180, are expected"
         )
-    config = AlignmentConfig(search_m=args.search, search_deg=args.turn, method=args.method, lobe=args.lobe)
+    config = AlignmentConfig(
+        search_m=args.search, search_deg=args.turn, method=args.method, lobe=args.lobe, device=args.device
+    )
     start = _start(args.start) if args.start is not None else None
     return Task(args.aerial, args.terrestrial, config, start, args.crs, args.least_dbh, args.sessions)
 

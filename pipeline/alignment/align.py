@@ -17,6 +17,8 @@ from pipeline.alignment.published import START_DEG, START_M, information_score, 
 from pipeline.alignment.refine import Score, climb, joint_score, spread
 from pipeline.alignment.scene import Scene
 from pipeline.alignment.search import COARSER, Advance, Candidate, Maps, candidates, coarser, sweep
+from pipeline.alignment.torch_kernels import Kernels
+from pipeline.alignment.torch_kernels import kernels as on_device
 from pipeline.alignment.transform import Transform
 from pipeline.alignment.verdict import best_rival, doubts
 from pipeline.alignment.vertical import Vertical, ground_to_ground
@@ -61,13 +63,14 @@ class Alignment:
 
 def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance) -> Alignment:
     """Raises `ApartError` where the maps share nothing that could be compared."""
+    kernels = on_device(config.device)
     layers = shared_layers(fixed, moved, config)
     if config.method == "nmi":
         layers = [one for one in layers if one.name == STEMS]
     if not layers:
         raise ApartError(_nothing(moved, config))
     maps = Maps(layers, fixed.grid, moved.grid, moved.grid.middle_m)
-    score, found, steps = _answers(maps, config, advance)
+    score, found, steps = _answers(maps, config, kernels, advance)
     if not found:
         raise ApartError(
             f"nowhere within {config.search_m:g} m do {config.overlap:.0%} of the footprint of the ground map lie on "
@@ -89,18 +92,18 @@ def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance)
         vertical=vertical,
         margin_nats=top.nats - (rival.nats if rival else 0.0),
         rival=rival,
-        shares=[_share(maps, one, top) for one in layers],
+        shares=[_share(maps, one, top, kernels) for one in layers],
         overlap=_overlap(fixed, moved, shift),
         doubts=doubts(top, rival, flat, stems, config),
     )
 
 
 def _answers(
-    maps: Maps, config: AlignmentConfig, advance: Advance
+    maps: Maps, config: AlignmentConfig, kernels: Kernels, advance: Advance
 ) -> tuple[Score, list[Candidate], tuple[float, float]]:
     """The score, candidates of it, and steps in metres and degrees that their tops lie within."""
     if config.method == "nmi":
-        score = information_score(maps, maps.layers[0], config)
+        score = information_score(maps, maps.layers[0], config, kernels)
         return (
             score,
             starts(score, config.search_m, config.search_deg, CANDIDATES, advance),
@@ -108,12 +111,12 @@ def _answers(
         )
     landscape = sweep(coarser(maps, COARSER), config.search_m, config.search_deg, config.overlap, advance)
     step_deg = float(landscape.yaws_deg[1] - landscape.yaws_deg[0])
-    return joint_score(maps), candidates(landscape, CANDIDATES), (COARSER * config.cell_m / 2, step_deg / 2)
+    return joint_score(maps, kernels), candidates(landscape, CANDIDATES), (COARSER * config.cell_m / 2, step_deg / 2)
 
 
-def _share(maps: Maps, one: Layer, top: Candidate) -> Share:
+def _share(maps: Maps, one: Layer, top: Candidate, kernels: Kernels) -> Share:
     alone = Maps([one], maps.fixed, maps.moving, maps.pivot_m)
-    nats = float(joint_score(alone)(np.array([[top.x_m, top.y_m, top.yaw_deg]]))[0])
+    nats = float(joint_score(alone, kernels)(np.array([[top.x_m, top.y_m, top.yaw_deg]]))[0])
     return Share(one.name, nats, float(one.seen.sum() * one.independent))
 
 

@@ -34,5 +34,7 @@ class AlignmentConfig:
     margin_nats: float = 6.0
     """Least log-likelihood ratio to the best other answer: 6 is odds of four hundred to one, were the model true."""
     least_stems: int = 12
+    device: str = "cpu"
+    """Where candidate poses are scored; `cuda` takes PyTorch and a GPU."""
     crown_bias_m: float = 0.5
     """Crowns do not stand above their stems: sigma of that as an offset common to a plot, where only stems tell."""
