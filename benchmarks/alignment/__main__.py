@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 METHODS = ("ours", "published", "printed", "clique")
+PEERS = ("icp", "plane", "gicp", "fgr", "ransac")
 
 
 def main() -> None:
@@ -16,13 +17,13 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path("../shared/data/forest"))
     parser.add_argument("--first", type=int, default=0, help="perturbation, or seed, to begin with")
     parser.add_argument("--count", type=int, default=100, help="how many")
-    parser.add_argument("--methods", nargs="*", choices=METHODS, default=METHODS)
-    parser.add_argument("--peers", type=Path, help="a Python with open3d and small_gicp")
+    parser.add_argument("--methods", nargs="*", choices=(*METHODS, *PEERS), default=METHODS)
+    parser.add_argument("--peers", type=Path, help="a Python with open3d and small_gicp, for icp to ransac")
     parser.add_argument("--device", default="cpu", help="of PyTorch, for poses: cpu or cuda")
-    parser.add_argument(
-        "--log", type=Path, default=Path(tempfile.gettempdir()) / "alignment.jsonl", help="of all parts"
-    )
+    parser.add_argument("--log", type=Path, default=Path(tempfile.gettempdir(), "alignment.jsonl"), help="of all parts")
     args = parser.parse_args()
+    if set(args.methods) & set(PEERS) and args.peers is None:
+        parser.error(f"{', '.join(PEERS)} need --peers")
     if args.what == "poses":
         from benchmarks.alignment import poses
 
@@ -40,8 +41,9 @@ def _trials(args: argparse.Namespace) -> None:
     run = {"chablais": chablais, "fort-valley": fort_valley, "stands": stands}
     if args.what in run:
         with tempfile.TemporaryDirectory() as folder:
-            methods = tuple(args.methods)
-            asked = Asked(args.data, args.first, args.count, methods, args.peers, Path(folder))
+            peers = tuple(one for one in args.methods if one in PEERS)
+            methods = tuple(one for one in args.methods if one in METHODS)
+            asked = Asked(args.data, args.first, args.count, methods, peers, args.peers, Path(folder))
             for one in run[args.what](asked):
                 log(args.log, one)
     print(tables(read_log(args.log)))

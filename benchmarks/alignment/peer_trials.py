@@ -39,7 +39,9 @@ def clique(case: Case) -> Trial:
 
 def peers(asked: Asked, pair: str, aerial: Path, ground: Path, trues: Sequence[Transform]) -> Iterator[Trial]:
     """ground: not pushed yet; of a table of stems they get columns as high as the trees. Heights are right already."""
-    assert asked.peers is not None
+    if not asked.peers:
+        return
+    assert asked.python is not None
     folder = asked.folder
     fixed = np.concatenate([batch.xyz_m for batch in batches(inspect(aerial))])
     moved = _columns(aerial, ground) if ground.suffix == ".csv" else _points(ground)
@@ -48,7 +50,7 @@ def peers(asked: Asked, pair: str, aerial: Path, ground: Path, trues: Sequence[T
     pushed = [[one.x_m, one.y_m, one.yaw_deg] for one in trues]
     (folder / "pushes.json").write_text(json.dumps(pushed))
     script = Path(__file__).with_name("run_peers.py")
-    with subprocess.Popen([asked.peers, script, folder], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([asked.python, script, folder, *asked.peers], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         for line in process.stdout:
             told = json.loads(line)

@@ -23,8 +23,7 @@ def chablais(asked: Asked) -> Iterator[Trial]:
     for true in trues:
         ground = push_stems(stems, asked.folder / "stems.csv", true)
         yield from each(asked, Case("chablais3", aerial, ground, true))
-    if asked.peers:
-        yield from peers(asked, "chablais3", aerial, stems, trues)
+    yield from peers(asked, "chablais3", aerial, stems, trues)
 
 
 def fort_valley(asked: Asked) -> Iterator[Trial]:
@@ -35,8 +34,7 @@ def fort_valley(asked: Asked) -> Iterator[Trial]:
     for true in trues:
         pushed = push_cloud(ground, asked.folder / "ground.laz", true)
         yield from each(asked, Case("Fort Valley", aerial, pushed, true, SAME_OUTLINE))
-    if asked.peers:
-        yield from peers(asked, "Fort Valley", aerial, ground, trues)
+    yield from peers(asked, "Fort Valley", aerial, ground, trues)
 
 
 def each(asked: Asked, case: Case) -> Iterator[Trial]:

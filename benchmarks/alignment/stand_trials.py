@@ -44,7 +44,7 @@ def stands(asked: Asked) -> Iterator[Trial]:
             true = _off(above(seed), seed)
             seen = from_the_ground(below(seed), RADIUS_M, true, crowns=crowns)
             yield from each(asked, Case(name, air, write_las(asked.folder / "ground.laz", seen), true))
-            if asked.peers and name not in REFUSED:
+            if name not in REFUSED:
                 yield from peers(asked, name, air, write_las(asked.folder / "still.laz", true.apply(seen)), [true])
 
 

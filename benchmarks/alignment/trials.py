@@ -33,13 +33,17 @@ OURS = {
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Which part of a benchmark. first, count: of the pushes or seeds. peers: a Python with open3d and small_gicp."""
+    """Which part of a benchmark. first, count: of the pushes or seeds.
+
+    methods: of `OURS`, and clique. peers: those of `run_peers`, run by python, which has open3d and small_gicp.
+    """
 
     data: Path
     first: int
     count: int
     methods: tuple[str, ...]
-    peers: Path | None
+    peers: tuple[str, ...]
+    python: Path | None
     folder: Path
 
 
