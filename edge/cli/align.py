@@ -108,7 +108,8 @@ def _show(out: Console, found: Result) -> None:
     height = "" if found.z_m is None else f", {found.z_m:+.2f} ± {found.sigma_z_m:.2f} m up"
     out.print(
         f"[bold {tone}]{found.verdict}[/]: {found.x_m:+.2f} m east, {found.y_m:+.2f} m north, {found.yaw_deg:+.2f}° "
-        f"± {found.sigma_m:.2f} m, {found.sigma_deg:.2f}°{height}; {found.margin_nats:.1f} nats ahead of the next",
+        f"± {found.sigma_m:.2f} m, {found.sigma_deg:.2f}°{height}; {found.margin_nats:.1f} nats ahead of the next, "
+        f"{found.asked_nats:.1f} asked for",
         highlight=False,
     )
     for line in (*found.doubts, *found.notes):

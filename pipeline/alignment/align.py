@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,10 +20,11 @@ from pipeline.alignment.search import COARSER, Advance, Candidate, Maps, candida
 from pipeline.alignment.torch_kernels import Kernels
 from pipeline.alignment.torch_kernels import kernels as on_device
 from pipeline.alignment.transform import Transform
-from pipeline.alignment.verdict import best_rival, doubts
+from pipeline.alignment.verdict import best_rival, chance_nats, doubts
 from pipeline.alignment.vertical import Vertical, ground_to_ground
 
-CANDIDATES = 8
+CANDIDATES, ANSWERS = 8, 500
+"""Climbed, and looked at to learn how far chance carries one."""
 BIAS_M, BIAS_RAD = 0.15, 0.005
 """Sigma of what cells and beams that see other sides of a crown do to every pose, however many trees there are."""
 NEAR_BEST = 0.5
@@ -43,13 +44,15 @@ class Share:
 class Alignment:
     """transform: of the moved map, about the middle of its footprint. covariance: (4, 4) of x, y, z (m), yaw (rad).
 
-    margin_nats: to the best other answer, or to none at all. doubts: why it may not be believed; empty when it may.
+    margin_nats: to the best other answer, or to none at all; asked_nats: what is asked of it.
+    doubts: why it may not be believed; empty when it may.
     """
 
     transform: Transform
     covariance: Array
     vertical: Vertical | None
     margin_nats: float
+    asked_nats: float
     rival: Candidate | None
     shares: Sequence[Share]
     overlap: float
@@ -76,9 +79,11 @@ def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance)
             f"nowhere within {config.search_m:g} m do {config.overlap:.0%} of the footprint of the ground map lie on "
             "the other map; get a larger piece of it, or search farther"
         )
-    worth = [one for one in found if one.nats >= NEAR_BEST * found[0].nats]
-    tops = sorted([*(climb(score, one, *steps) for one in worth), *found[len(worth) :]], key=lambda one: -one.nats)
-    top, rival = tops[0], best_rival(tops, config)
+    worth = [one for one in found[:CANDIDATES] if one.nats >= NEAR_BEST * found[0].nats]
+    climbed = [climb(score, one, *steps) for one in worth]
+    top = max(climbed, key=lambda one: one.nats)
+    rival = best_rival(top, [*climbed, *found[len(worth) :]], config)
+    config = replace(config, margin_nats=config.margin_nats * chance_nats(found, config))
     flat = spread(score, top, config.rival_m, config.rival_deg) + np.diag(np.square([BIAS_M, BIAS_M, BIAS_RAD]))
     if [one.name for one in layers] == [STEMS] and fixed.stems_m is None:
         flat[0, 0] += config.crown_bias_m**2
@@ -91,6 +96,7 @@ def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance)
         covariance=_with_height(flat, vertical),
         vertical=vertical,
         margin_nats=top.nats - (rival.nats if rival else 0.0),
+        asked_nats=config.margin_nats,
         rival=rival,
         shares=[_share(maps, one, top, kernels) for one in layers],
         overlap=_overlap(fixed, moved, shift),
@@ -106,12 +112,12 @@ def _answers(
         score = information_score(maps, maps.layers[0], config, kernels)
         return (
             score,
-            starts(score, config.search_m, config.search_deg, CANDIDATES, advance),
+            starts(score, config.search_m, config.search_deg, 3 * CANDIDATES, advance),
             (START_M / 2, START_DEG / 2),
         )
     landscape = sweep(coarser(maps, COARSER), config.search_m, config.search_deg, config.overlap, advance)
     step_deg = float(landscape.yaws_deg[1] - landscape.yaws_deg[0])
-    return joint_score(maps, kernels), candidates(landscape, CANDIDATES), (COARSER * config.cell_m / 2, step_deg / 2)
+    return joint_score(maps, kernels), candidates(landscape, ANSWERS), (COARSER * config.cell_m / 2, step_deg / 2)
 
 
 def _share(maps: Maps, one: Layer, top: Candidate, kernels: Kernels) -> Share:
