@@ -16,13 +16,13 @@ from pipeline.alignment.errors import DeviceError
 from pipeline.alignment.grid import Array, Mask
 
 Levels = npt.NDArray[np.int64]
-AT_ONCE = 2_000_000
+AT_ONCE = 8_000_000
 """Samples: half a gigabyte on the way."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kernels:
-    """`pose_information` and `pose_sums` of `nmi_kernels`, or what gives the same to rounding."""
+    """`pose_information` and `pose_sums` of `nmi_kernels`, or what gives the same to single precision."""
 
     information: Callable[..., Array]
     sums: Callable[..., Array]
@@ -56,30 +56,26 @@ def by_torch(torch: Any, device: str) -> Kernels:
 
 
 def _information(
-    torch: Any,
-    device: str,
-    xy: Array,
-    levels: Levels,
-    field: Array,
-    known: Mask,
-    poses: Array,
-    bins: int,
+    torch: Any, device: str, xy: Array, levels: Levels, field: Array, known: Mask, poses: Array, bins: int
 ) -> Array:
-    of = torch.nn.functional.one_hot(torch.as_tensor(levels, device=device), bins).double()
-    line = torch.arange(bins, dtype=torch.float64, device=device)[:, None]
+    rows = torch.as_tensor(levels * bins, device=device)
     found = []
-    for value in _interpolated(torch, device, xy, field, known, poses, bins):
-        used = ~value.isnan()
-        # A sample gives to the two bins next to it by nearness; what is not known lies far from all.
-        at = torch.where(used, value * (bins - 1), -2.0)
-        joint = (at[:, None, :] - line).abs_().neg_().add_(1.0).clamp_(min=0.0) @ of
-        total = used.sum(dim=1).clamp(min=1)[:, None]
+    for value in _interpolated(torch, device, xy, field, known, poses):
+        at = value * (bins - 1)
+        low = at.floor().clamp_(0, bins - 2)
+        share = at - low
+        # What is not known goes to two bins that nothing is read from.
+        bin_of = (rows + low).nan_to_num_(bins * bins).long()
+        joint = torch.zeros(len(value), bins * bins + 2, device=device)
+        joint.scatter_add_(1, bin_of, 1.0 - share).scatter_add_(1, bin_of.add_(1), share)
+        joint = joint[:, :-2].double().reshape(-1, bins, bins)
+        used = joint.sum(dim=(1, 2)).round()
+        shares = joint / used.clamp(min=1.0)[:, None, None]
         both, first, second = (
-            _entropy(torch, counts / total) for counts in (joint.flatten(1), joint.sum(dim=1), joint.sum(dim=2))
+            _entropy(torch, one) for one in (shares.flatten(1), shares.sum(dim=1), shares.sum(dim=2))
         )
         information = torch.where(both > 1e-12, (first + second) / both, 1.0)
-        some = used.any(dim=1)
-        found.append(torch.stack([information * some, both, used.sum(dim=1).double()], dim=1))
+        found.append(torch.stack([information * (used > 0), both, used], dim=1))
     return np.asarray(torch.cat(found).cpu().numpy())
 
 
@@ -87,35 +83,32 @@ def _sums(torch: Any, device: str, xy: Array, values: Array, field: Array, known
     b = torch.as_tensor(values, device=device)
     powers = torch.stack([torch.ones_like(b), b, b * b], dim=1)
     found = []
-    for value in _interpolated(torch, device, xy, field, known, poses, 1):
-        a = value.nan_to_num(0.0)
+    for value in _interpolated(torch, device, xy, field, known, poses):
+        a = value.nan_to_num(0.0).double()
         n, sb, sbb = ((~value.isnan()).double() @ powers).T
         sa, sab = (a @ powers[:, :2]).T
         found.append(torch.stack([n, sa, sb, (a * a).sum(dim=1), sbb, sab], dim=1))
     return np.asarray(torch.cat(found).cpu().numpy())
 
 
-def _interpolated(
-    torch: Any, device: str, xy: Array, field: Array, known: Mask, poses: Array, wide: int
-) -> Iterator[Any]:
-    """(k, n) of so many poses at once; NaN where one of the four cells around is not known."""
-    corners = [(slice(i, i - 1 or None), slice(j, j - 1 or None)) for i in (0, 1) for j in (0, 1)]
-    around = np.stack([np.where(known, field, np.nan)[corner].ravel() for corner in corners], axis=1)
-    # The last row stands for all beyond the rim.
-    table = torch.as_tensor(np.vstack([around, np.full((1, 4), np.nan)]), device=device)
-    samples, at = torch.as_tensor(xy, device=device), torch.as_tensor(poses, device=device)
-    nx, ny = field.shape[0] - 1, field.shape[1] - 1
-    for part in at.split(max(1, AT_ONCE // (len(xy) * -(-wide // 4)))):
-        c, s = torch.cos(part[:, 2:]), torch.sin(part[:, 2:])
-        x = c * samples[:, 0] - s * samples[:, 1] + part[:, :1]
-        y = s * samples[:, 0] + c * samples[:, 1] + part[:, 1:2]
-        ix, iy = x.floor(), y.floor()
-        inside = (ix >= 0) & (iy >= 0) & (ix < nx) & (iy < ny)
-        four = table[torch.where(inside, ix * ny + iy, nx * ny).long()]
-        fx, fy = x - ix, y - iy
-        near = (1.0 - fy) * four[..., 0] + fy * four[..., 1]
-        far = (1.0 - fy) * four[..., 2] + fy * four[..., 3]
-        yield (1.0 - fx) * near + fx * far
+def _interpolated(torch: Any, device: str, xy: Array, field: Array, known: Mask, poses: Array) -> Iterator[Any]:
+    """(k, n) of so many poses at once; NaN where one of the four cells around is not known, or there is none."""
+    image = np.pad(np.where(known, field, np.nan), 1, constant_values=np.nan)
+    image = torch.as_tensor(image, dtype=torch.float32, device=device)[None, None]
+    samples = torch.as_tensor(np.vstack([xy.T, np.ones(len(xy))]), dtype=torch.float32, device=device)
+    turns = torch.as_tensor(_onto_image(poses, field.shape), dtype=torch.float32, device=device)
+    for part in turns.split(max(1, AT_ONCE // len(xy))):
+        at = (part.reshape(-1, 3) @ samples).reshape(len(part), 2, -1).transpose(1, 2)
+        sampled = torch.nn.functional.grid_sample(image, at[None], padding_mode="border", align_corners=True)
+        yield sampled[0, 0]
+
+
+def _onto_image(poses: Array, shape: tuple[int, ...]) -> Array:
+    """(k, 2, 3) that take samples (x, y, 1) to y and x in -1..1 over the middles of the outermost cells of the rim."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = np.stack([c, -s, poses[:, 0] + 1.0], axis=1) * 2.0 / (shape[0] + 1)
+    y = np.stack([s, c, poses[:, 1] + 1.0], axis=1) * 2.0 / (shape[1] + 1)
+    return np.asarray(np.stack([y, x], axis=1) - np.array([0.0, 0.0, 1.0]))
 
 
 def _entropy(torch: Any, shares: Any) -> Any:
