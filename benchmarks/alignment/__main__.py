@@ -15,7 +15,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="benchmarks.alignment", description=__doc__)
     parser.add_argument("what", choices=["chablais", "fort-valley", "stands", "sessions", "poses", "table"])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/forest"))
-    parser.add_argument("--first", type=int, default=0, help="perturbation, or seed, to begin with")
+    parser.add_argument("--first", type=int, default=0, help="perturbation, or made-up pair, to begin with")
     parser.add_argument("--count", type=int, default=100, help="how many")
     parser.add_argument("--methods", nargs="*", choices=(*METHODS, *PEERS), default=METHODS)
     parser.add_argument("--peers", type=Path, help="a Python with open3d and small_gicp, for icp to ransac")

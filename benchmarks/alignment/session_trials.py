@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.alignment.stands import Stand, from_the_ground, grow, write_las
+from benchmarks.alignment.stands import Kind, Stand, from_the_ground, grow, write_las
 from benchmarks.alignment.trials import Asked, Trial
 from edge import __version__
 from pipeline.alignment.config import AlignmentConfig
@@ -21,7 +21,7 @@ from pipeline.evaluation.alignment import AlignmentErrors
 RADIUS_M, SIDE_M = 18.0, 110.0
 MISSED = 0.1
 """Share of the stems that either walk does not see."""
-PAIRS: dict[str, tuple[str, float, float]] = {
+PAIRS: dict[str, tuple[Kind, float, float]] = {
     "shared by three quarters": ("mixed", 0.6, 7.0),
     "by a half": ("mixed", 0.6, 14.5),
     "by a half, flat": ("mixed", 0.0, 14.5),
@@ -33,11 +33,11 @@ PAIRS: dict[str, tuple[str, float, float]] = {
 
 
 def sessions(asked: Asked) -> Iterator[Trial]:
-    """A pair after the other for each seed."""
-    for seed in range(asked.first, asked.first + asked.count):
-        for name, (kind, relief_m, apart_m) in PAIRS.items():
-            stand = grow("rows" if kind == "rows" else "mixed", seed, side_m=SIDE_M, relief_m=relief_m)
-            yield _trial(name, stand, apart_m, seed, asked.folder)
+    """All pairs of one seed after those of another."""
+    for k in range(asked.first, asked.first + asked.count):
+        seed, (name, (kind, relief_m, apart_m)) = k // len(PAIRS), list(PAIRS.items())[k % len(PAIRS)]
+        stand = grow(kind, seed, side_m=SIDE_M, relief_m=relief_m)
+        yield _trial(name, stand, apart_m, seed, asked.folder)
 
 
 def _trial(name: str, stand: Stand, apart_m: float, seed: int, folder: Path) -> Trial:

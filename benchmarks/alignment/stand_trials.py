@@ -37,15 +37,15 @@ REFUSED = ("plantation rows, flat", "five trees, flat", "another stand, flat")
 
 
 def stands(asked: Asked) -> Iterator[Trial]:
-    """A patch after the other for each seed. Peers are not asked where nothing may be found."""
-    for seed in range(asked.first, asked.first + asked.count):
-        for name, (above, below, crowns) in PATCHES.items():
-            air = write_las(asked.folder / "air.laz", from_the_air(above(seed)))
-            true = _off(above(seed), seed)
-            seen = from_the_ground(below(seed), RADIUS_M, true, crowns=crowns)
-            yield from each(asked, Case(name, air, write_las(asked.folder / "ground.laz", seen), true))
-            if name not in REFUSED:
-                yield from peers(asked, name, air, write_las(asked.folder / "still.laz", true.apply(seen)), [true])
+    """All patches of one seed after those of another. Peers are not asked where nothing may be found."""
+    for k in range(asked.first, asked.first + asked.count):
+        seed, (name, (above, below, crowns)) = k // len(PATCHES), list(PATCHES.items())[k % len(PATCHES)]
+        air = write_las(asked.folder / "air.laz", from_the_air(above(seed)))
+        true = _off(above(seed), seed)
+        seen = from_the_ground(below(seed), RADIUS_M, true, crowns=crowns)
+        yield from each(asked, Case(name, air, write_las(asked.folder / "ground.laz", seen), true))
+        if name not in REFUSED:
+            yield from peers(asked, name, air, write_las(asked.folder / "still.laz", true.apply(seen)), [true])
 
 
 def _off(stand: Stand, seed: int) -> Transform:

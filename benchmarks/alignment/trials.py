@@ -33,7 +33,7 @@ OURS = {
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Which part of a benchmark. first, count: of the pushes or seeds.
+    """Which part of a benchmark. first, count: of the pushes or made-up pairs.
 
     methods: of `OURS`, and clique. peers: those of `run_peers`, run by python, which has open3d and small_gicp.
     """

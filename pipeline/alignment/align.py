@@ -77,7 +77,7 @@ def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance)
     if not found:
         raise ApartError(
             f"nowhere within {config.search_m:g} m do {config.overlap:.0%} of the footprint of the ground map lie on "
-            "the other map; get a larger piece of it, or search farther"
+            "the other map; get a larger piece of that one, or search farther"
         )
     worth = [one for one in found[:CANDIDATES] if one.nats >= NEAR_BEST * found[0].nats]
     climbed = [climb(score, one, *steps) for one in worth]

@@ -142,14 +142,15 @@ def _reached(moved: Scene, config: AlignmentConfig) -> Grid:
 
 
 def _named(cloud: Cloud, crs: str | None) -> Cloud:
-    if cloud.crs is not None or crs is None:
+    if crs is None:
         return cloud
     try:
-        return replace(cloud, crs=pyproj.CRS.from_user_input(crs))
+        named = pyproj.CRS.from_user_input(crs)
     except pyproj.exceptions.CRSError as error:
         raise FrameError(
             f"--crs {crs}: no coordinate system is known by that name; write EPSG:32612, for example"
         ) from error
+    return cloud if cloud.crs is not None else replace(cloud, crs=named)
 
 
 def _table_cloud(task: Task) -> Cloud:
