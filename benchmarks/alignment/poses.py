@@ -14,7 +14,7 @@ import numpy as np
 from numba import get_num_threads
 from scipy import ndimage
 
-from pipeline.alignment.torch_kernels import by_torch, kernels
+from pipeline.alignment.torch_kernels import by_torch, kernels_on
 
 SIDES_M = (25, 50, 100, 200)
 CELL_M, BINS, POSES = 0.5, 16, 1000
@@ -55,7 +55,7 @@ def compare(device: str) -> str:
 
 def _methods(device: str) -> dict[str, tuple[Callable[[Made], np.ndarray], int]]:
     """Each with the poses it gets."""
-    found = {"Numba": (_by(kernels("cpu").information), POSES)}
+    found = {"Numba": (_by(kernels_on("cpu").information), POSES)}
     if find_spec("torch") is None:
         return found
     import torch

@@ -17,8 +17,7 @@ from pipeline.alignment.published import START_DEG, START_M, information_score, 
 from pipeline.alignment.refine import Score, climb, joint_score, spread
 from pipeline.alignment.scene import Scene
 from pipeline.alignment.search import COARSER, Advance, Candidate, Maps, candidates, coarser, sweep
-from pipeline.alignment.torch_kernels import Kernels
-from pipeline.alignment.torch_kernels import kernels as on_device
+from pipeline.alignment.torch_kernels import Kernels, kernels_on
 from pipeline.alignment.transform import Transform
 from pipeline.alignment.verdict import best_rival, chance_nats, doubts
 from pipeline.alignment.vertical import Vertical, ground_to_ground
@@ -66,7 +65,7 @@ class Alignment:
 
 def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance) -> Alignment:
     """Raises `ApartError` where the maps share nothing that could be compared."""
-    kernels = on_device(config.device)
+    kernels = kernels_on(config.device)
     layers = shared_layers(fixed, moved, config)
     if config.method == "nmi":
         layers = [one for one in layers if one.name == STEMS]
@@ -112,7 +111,7 @@ def _answers(
         score = information_score(maps, maps.layers[0], config, kernels)
         return (
             score,
-            starts(score, config.search_m, config.search_deg, 3 * CANDIDATES, advance),
+            starts(score, config.search_m, config.search_deg, CANDIDATES, advance),
             (START_M / 2, START_DEG / 2),
         )
     landscape = sweep(coarser(maps, COARSER), config.search_m, config.search_deg, config.overlap, advance)

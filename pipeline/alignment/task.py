@@ -17,7 +17,7 @@ from pipeline.alignment.frames import Placed, check_heights, place
 from pipeline.alignment.grid import Array, Grid
 from pipeline.alignment.scene import Scene, Source, aerial_scene, stem_scene, terrestrial_scene
 from pipeline.alignment.stem_table import read_stems
-from pipeline.alignment.torch_kernels import kernels
+from pipeline.alignment.torch_kernels import kernels_on
 from pipeline.alignment.transform import Transform
 
 Stage = Callable[[str], Callable[[float], None]]
@@ -59,7 +59,7 @@ class Done:
 
 def run(task: Task, stage: Stage) -> Done:
     """Raises `AlignmentError` of any kind."""
-    kernels(task.config.device)  # whether it is there at all, before minutes of reading
+    kernels_on(task.config.device)  # whether it is there at all, before minutes of reading
     if task.sessions:
         return _run_sessions(task, stage)
     aerial = _named(inspect(task.aerial), task.crs)

@@ -28,7 +28,7 @@ class Kernels:
     sums: Callable[..., Array]
 
 
-def kernels(device: str) -> Kernels:
+def kernels_on(device: str) -> Kernels:
     """device: cpu, or what PyTorch calls it: cuda, cuda:1.
 
     Raises `DeviceError` where PyTorch or the device is missing.

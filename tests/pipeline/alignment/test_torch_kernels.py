@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from pipeline.alignment.errors import DeviceError
 from pipeline.alignment.fields import scaled
-from pipeline.alignment.torch_kernels import by_torch, kernels
+from pipeline.alignment.torch_kernels import by_torch, kernels_on
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def test_pytorch_gives_the_scores_of_the_compiled_kernels(given, monkeypatch):
     monkeypatch.setattr("pipeline.alignment.torch_kernels.AT_ONCE", 20_000)
     xy, values, field, known, poses = given
     levels = np.digitize(values, np.linspace(-2, 2, 15))
-    theirs, ours = by_torch(torch, "cpu"), kernels("cpu")
+    theirs, ours = by_torch(torch, "cpu"), kernels_on("cpu")
     expected = ours.information(xy, levels, field, known, poses, 16)
     np.testing.assert_allclose(theirs.information(xy, levels, field, known, poses, 16), expected, atol=1e-5)
     assert expected[-1].tolist() == [0.0, 0.0, 0.0]
@@ -35,4 +35,4 @@ def test_pytorch_gives_the_scores_of_the_compiled_kernels(given, monkeypatch):
 def test_a_gpu_without_pytorch_is_refused_with_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(DeviceError, match=r"--device cuda: needs PyTorch.*leave --device out"):
-        kernels("cuda")
+        kernels_on("cuda")
