@@ -28,11 +28,11 @@ COLUMN_M = 0.5
 
 
 def clique(case: Case) -> Trial:
-    """Of a cloud every stem counts alike."""
+    """Of a table its thickest stems, of a cloud those nearest the middle."""
     cpu = time.process_time()
-    stems, thickness = _stems(case.ground)
+    stems, rank = _stems(case.ground)
     pivot = stems.mean(axis=0)
-    found = clique_pose(_scene(case.aerial, pivot), stems, thickness, pivot, REACH_M)
+    found = clique_pose(_scene(case.aerial, pivot), stems, rank, pivot, REACH_M)
     errors = None if found is None else _errors(found, case.true)
     return Trial(case.pair, "clique", errors, time.process_time() - cpu)
 
@@ -73,7 +73,7 @@ def _stems(ground: Path) -> tuple[Array, Array]:
     grid = Grid.over(cloud.low_m[:2], cloud.high_m[:2], AlignmentConfig().cell_m)
     scene = terrestrial_scene(lambda: batches(cloud), grid)
     assert scene.stems_m is not None
-    return scene.stems_m, np.ones(len(scene.stems_m))
+    return scene.stems_m, -np.linalg.norm(scene.stems_m - scene.stems_m.mean(axis=0), axis=1)
 
 
 def _points(path: Path) -> Array:
