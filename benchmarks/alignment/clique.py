@@ -17,10 +17,13 @@ STEPS = 40_000
 """Branches tried before the best clique so far is taken."""
 
 
-def clique_pose(fixed: Scene, stems_m: Array, thickness: Array, pivot: Array, reach_m: float) -> Transform | None:
-    """The rigid transform of the largest clique; None with fewer than three matches. stems_m: (n, 2)."""
+def clique_pose(fixed: Scene, stems_m: Array, rank: Array, pivot: Array, reach_m: float) -> Transform | None:
+    """The rigid transform of the largest clique; None with fewer than three matches.
+
+    stems_m: (n, 2), of which those of the highest rank (n,) are taken.
+    """
     assert fixed.canopy_m is not None
-    stems = stems_m[np.argsort(-thickness)[:MOST_STEMS]]
+    stems = stems_m[np.argsort(-rank)[:MOST_STEMS]]
     crowns = _crowns(fixed, pivot, reach_m)
     near = np.linalg.norm(stems[:, None] - crowns[None], axis=2) <= reach_m
     i, j = np.nonzero(near)

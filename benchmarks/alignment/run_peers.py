@@ -17,25 +17,25 @@ REACH_M = 3.0
 """Greatest distance of a correspondence of the ICPs."""
 
 
-def main(folder: Path) -> None:
-    """`pair.npz` and `pushes.json` lie in the folder."""
+def main(folder: Path, *asked: str) -> None:
+    """`pair.npz` and `pushes.json` lie in the folder. asked: names of methods."""
     pair = np.load(folder / "pair.npz")
     fixed, moved = pair["fixed"], pair["moved"]
     methods = {
-        "ICP": lambda a, b: small(a, b, "ICP"),
-        "point-to-plane ICP": lambda a, b: small(a, b, "PLANE_ICP"),
-        "GICP": lambda a, b: small(a, b, "GICP"),
-        "FPFH and FGR": lambda a, b: features(a, b, ransac=False),
-        "FPFH and RANSAC": lambda a, b: features(a, b, ransac=True),
+        "icp": lambda a, b: small(a, b, "ICP"),
+        "plane": lambda a, b: small(a, b, "PLANE_ICP"),
+        "gicp": lambda a, b: small(a, b, "GICP"),
+        "fgr": lambda a, b: features(a, b, ransac=False),
+        "ransac": lambda a, b: features(a, b, ransac=True),
     }
     o3d.utility.random.seed(1)
     o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
     for push in json.loads((folder / "pushes.json").read_text()):
         true = matrix(*push)
         pushed = apply(np.linalg.inv(true), moved)
-        for name, method in methods.items():
+        for name in asked:
             start = time.process_time()
-            found = method(fixed, pushed)
+            found = methods[name](fixed, pushed)
             spent = time.process_time() - start
             off = found @ np.linalg.inv(true)
             yaw = float(np.degrees(np.arctan2(off[1, 0], off[0, 0])))
@@ -92,4 +92,4 @@ def apply(transform: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from benchmarks.alignment.peer_trials import peers
+from benchmarks.alignment.real_trials import each
 from benchmarks.alignment.stands import Stand, from_the_air, from_the_ground, grow, write_las
-from benchmarks.alignment.trials import OURS, Trial, ours, table
+from benchmarks.alignment.trials import Asked, Case, Trial
 from pipeline.alignment.transform import Transform
 
 RADIUS_M, SIDE_M = 20.0, 90.0
@@ -33,24 +33,23 @@ PATCHES: dict[str, tuple[Callable[[int], Stand], Callable[[int], Stand], bool]] 
     "another stand, flat": (lambda k: _mixed(k, 500.0, 0.0), lambda k: _mixed(k + 100, 500.0, 0.0), False),
 }
 """Name -> what flies over, what is walked in, whether crowns are seen from the ground."""
+REFUSED = ("plantation rows, flat", "five trees, flat", "another stand, flat")
 
 
-def run(seeds: int) -> str:
-    """A table a patch."""
-    parts = []
-    for name, (above, below, crowns) in PATCHES.items():
-        trials = [one for seed in range(seeds) for one in _both(above(seed), below(seed), seed, crowns)]
-        parts.append(f"{name}\n\n{table(trials)}\n")
-        print(parts[-1], flush=True)
-    return ""
+def stands(asked: Asked) -> Iterator[Trial]:
+    """All patches of one seed after those of another. Peers are not asked where nothing may be found."""
+    for k in range(asked.first, asked.first + asked.count):
+        seed, (name, (above, below, crowns)) = k // len(PATCHES), list(PATCHES.items())[k % len(PATCHES)]
+        air = write_las(asked.folder / "air.laz", from_the_air(above(seed)))
+        true = _off(above(seed), seed)
+        seen = from_the_ground(below(seed), RADIUS_M, true, crowns=crowns)
+        yield from each(asked, Case(name, air, write_las(asked.folder / "ground.laz", seen), true))
+        if name not in REFUSED:
+            yield from peers(asked, name, air, write_las(asked.folder / "still.laz", true.apply(seen)), [true])
 
 
-def _both(above: Stand, below: Stand, seed: int, crowns: bool) -> list[Trial]:
+def _off(stand: Stand, seed: int) -> Transform:
     rng = np.random.default_rng([seed, 17])
-    x, y = above.middle_m.tolist()
-    shift, turn = rng.uniform(-5, 5, 3), float(rng.uniform(-30, 30))
-    true = Transform((x, y), float(shift[0]), float(shift[1]), float(shift[2]), turn)
-    with tempfile.TemporaryDirectory() as folder:
-        air = write_las(Path(folder) / "air.laz", from_the_air(above))
-        ground = write_las(Path(folder) / "ground.laz", from_the_ground(below, RADIUS_M, true, crowns=crowns))
-        return [ours(method, air, ground, true) for method in list(OURS)[:2]]
+    x, y = stand.middle_m.tolist()
+    east, north, up = rng.uniform(-5, 5, 3).tolist()
+    return Transform((x, y), east, north, up, float(rng.uniform(-30, 30)))

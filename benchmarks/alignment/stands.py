@@ -72,15 +72,23 @@ def from_the_air(stand: Stand, per_m2: float = 8.0) -> Array:
 
 
 def from_the_ground(
-    stand: Stand, radius_m: float, off: Transform, *, crowns: bool, at_m: tuple[float, float] = (0, 0)
+    stand: Stand,
+    radius_m: float,
+    off: Transform,
+    *,
+    crowns: bool,
+    at_m: tuple[float, float] = (0, 0),
+    walk: int = 0,
+    missed: float = 0.0,
 ) -> Array:
     """(n, 3) within a radius about the middle plus at_m, moved by the inverse of `off`, which so is the truth.
 
-    crowns: whether the upper crowns are seen too.
+    crowns: whether the upper crowns are seen too. walk: another one has other noise. missed: share of its stems.
     """
-    rng = np.random.default_rng([stand.seed, 13])
+    rng = np.random.default_rng([stand.seed, 13, walk])
     middle = stand.middle_m + np.array(at_m)
     near = stand.trees[np.hypot(*(stand.trees[:, :2] - middle).T) < radius_m]
+    near = near[rng.uniform(size=len(near)) >= missed]
     parts = [_disc(rng, middle, radius_m, round(25 * np.pi * radius_m**2))]
     parts[0] = np.column_stack([parts[0], stand.ground_m(parts[0]) + rng.normal(0, 0.04, len(parts[0]))])
     for x, y, height, dbh, _ in near:

@@ -44,7 +44,7 @@ def _sweeps(data):
 
 
 def _rko(data, **settings):
-    from rko_lio.lio import LIO, LIOConfig  # noqa: PLC0415
+    from rko_lio.lio import LIO, LIOConfig
 
     lio = LIO(LIOConfig(**settings))
     extrinsic = np.eye(4)
@@ -74,8 +74,8 @@ def rko_fine(data, threads):
 
 
 def genz(data, threads):
-    import genz_lio  # noqa: PLC0415
-    from genz_lio import GenZLIO, load_config  # noqa: PLC0415
+    import genz_lio
+    from genz_lio import GenZLIO, load_config
 
     config = load_config(str(Path(genz_lio.__file__).parent / "configs/default/mid360.yaml"))
     config.max_threads = threads
@@ -95,8 +95,8 @@ def genz(data, threads):
 
 
 def kiss(data, threads):
-    from kiss_icp.config import KISSConfig  # noqa: PLC0415
-    from kiss_icp.kiss_icp import KissICP  # noqa: PLC0415
+    from kiss_icp.config import KISSConfig
+    from kiss_icp.kiss_icp import KissICP
 
     config = KISSConfig()
     config.mapping.voxel_size = 1.0

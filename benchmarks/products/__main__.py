@@ -68,7 +68,7 @@ def raster(folder: Path) -> Iterator[str]:
 
 def cogeo(folder: Path) -> Iterator[str]:
     """Whether the layout is that of the standard."""
-    from rio_cogeo.cogeo import cog_validate  # noqa: PLC0415 - only where it is installed
+    from rio_cogeo.cogeo import cog_validate
 
     good, errors, warnings = cog_validate(folder / "evidence.tif")
     if not good or warnings:
@@ -78,8 +78,8 @@ def cogeo(folder: Path) -> Iterator[str]:
 
 def cloud(folder: Path) -> Iterator[str]:
     """The points by the LASzip of the format's author, beside those of the decoder that is used here."""
-    import laspy  # noqa: PLC0415
-    import laszip  # noqa: F401, PLC0415 - only where it is installed
+    import laspy
+    import laszip  # noqa: F401 - only where it is installed
 
     ours, theirs = (
         laspy.read(folder / "map.laz", laz_backend=backend)
@@ -108,7 +108,7 @@ def geojson(folder: Path) -> Iterator[str]:
 
 def kml(folder: Path) -> Iterator[str]:
     """Against the schema of the OGC."""
-    from lxml import etree  # noqa: PLC0415 - only where it is installed
+    from lxml import etree
 
     schema = etree.XMLSchema(etree.parse(str(files("fastkml") / "schema" / "ogckml22.xsd")))
     for name in ("trajectory.kml", "findings.kml", "findings.kmz"):

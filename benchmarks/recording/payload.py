@@ -52,14 +52,14 @@ def payload(load: Load) -> Iterator[Senders]:
 
 
 def _lidar(load: Load, ready: Event, stop: Event, pause_s: Synchronized[float]) -> None:
-    from benchmarks.recording.lidar import CannedLidar  # noqa: PLC0415 - each process loads its own sensor
+    from benchmarks.recording.lidar import CannedLidar
 
     _prepare()
     CannedLidar(load, time.monotonic_ns(), pause_s).run(stop, None, ready.set)
 
 
 def _receiver(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> None:
-    from benchmarks.recording import receiver  # noqa: PLC0415
+    from benchmarks.recording import receiver
 
     _prepare()
     ready.set()
@@ -67,7 +67,7 @@ def _receiver(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> 
 
 
 def _camera(load: Load, ready: Event, stop: Event, _: Synchronized[float]) -> None:
-    from benchmarks.recording.camera import CannedCamera  # noqa: PLC0415
+    from benchmarks.recording.camera import CannedCamera
 
     _prepare()
     camera = CannedCamera(load, time.monotonic_ns())

@@ -58,6 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--lobe", choices=["positive", "absolute"], default="positive", help="of the Laplacian")
     parser.add_argument(
+        "--device",
+        default="cpu",
+        metavar="NAME",
+        help="cuda: score poses by PyTorch on a GPU, for wide searches of nmi",
+    )
+    parser.add_argument(
         "--sessions", action="store_true", help="both are ground maps: any turn, any shift, stems on stems"
     )
     parser.add_argument("--no-merge", action="store_true", help="leave merged.laz out")
@@ -102,7 +108,8 @@ def _show(out: Console, found: Result) -> None:
     height = "" if found.z_m is None else f", {found.z_m:+.2f} ± {found.sigma_z_m:.2f} m up"
     out.print(
         f"[bold {tone}]{found.verdict}[/]: {found.x_m:+.2f} m east, {found.y_m:+.2f} m north, {found.yaw_deg:+.2f}° "
-        f"± {found.sigma_m:.2f} m, {found.sigma_deg:.2f}°{height}; {found.margin_nats:.1f} nats ahead of the next",
+        f"± {found.sigma_m:.2f} m, {found.sigma_deg:.2f}°{height}; {found.margin_nats:.1f} nats ahead of the next, "
+        f"{found.asked_nats:.1f} asked for",
         highlight=False,
     )
     for line in (*found.doubts, *found.notes):
@@ -117,7 +124,9 @@ def _task(args: argparse.Namespace) -> Task:
         raise UsageError(
             f"--search {args.search:g} --turn {args.turn:g}: metres above 0, and degrees up to 180, are expected"
         )
-    config = AlignmentConfig(search_m=args.search, search_deg=args.turn, method=args.method, lobe=args.lobe)
+    config = AlignmentConfig(
+        search_m=args.search, search_deg=args.turn, method=args.method, lobe=args.lobe, device=args.device
+    )
     start = _start(args.start) if args.start is not None else None
     return Task(args.aerial, args.terrestrial, config, start, args.crs, args.least_dbh, args.sessions)
 

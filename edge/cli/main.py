@@ -117,6 +117,7 @@ def _set_up_logging(verbose: bool) -> None:
         _JournalFormatter() if under_systemd else logging.Formatter("%(levelname)s %(name)s: %(message)s")
     )
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler], force=True)
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # it raises as well what it logs
 
 
 class _JournalFormatter(logging.Formatter):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from pipeline.alignment.published import START_DEG, START_M, information_score, 
 from pipeline.alignment.refine import Score, climb, joint_score, spread
 from pipeline.alignment.scene import Scene
 from pipeline.alignment.search import COARSER, Advance, Candidate, Maps, candidates, coarser, sweep
+from pipeline.alignment.torch_kernels import Kernels, kernels_on
 from pipeline.alignment.transform import Transform
-from pipeline.alignment.verdict import best_rival, doubts
+from pipeline.alignment.verdict import best_rival, chance_nats, doubts
 from pipeline.alignment.vertical import Vertical, ground_to_ground
 
-CANDIDATES = 8
+CANDIDATES, ANSWERS = 8, 500
+"""Climbed, and looked at to learn how far chance carries one."""
 BIAS_M, BIAS_RAD = 0.15, 0.005
 """Sigma of what cells and beams that see other sides of a crown do to every pose, however many trees there are."""
 NEAR_BEST = 0.5
@@ -41,13 +43,15 @@ class Share:
 class Alignment:
     """transform: of the moved map, about the middle of its footprint. covariance: (4, 4) of x, y, z (m), yaw (rad).
 
-    margin_nats: to the best other answer, or to none at all. doubts: why it may not be believed; empty when it may.
+    margin_nats: to the best other answer, or to none at all; asked_nats: what is asked of it.
+    doubts: why it may not be believed; empty when it may.
     """
 
     transform: Transform
     covariance: Array
     vertical: Vertical | None
     margin_nats: float
+    asked_nats: float
     rival: Candidate | None
     shares: Sequence[Share]
     overlap: float
@@ -61,21 +65,24 @@ class Alignment:
 
 def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance) -> Alignment:
     """Raises `ApartError` where the maps share nothing that could be compared."""
+    kernels = kernels_on(config.device)
     layers = shared_layers(fixed, moved, config)
     if config.method == "nmi":
         layers = [one for one in layers if one.name == STEMS]
     if not layers:
         raise ApartError(_nothing(moved, config))
     maps = Maps(layers, fixed.grid, moved.grid, moved.grid.middle_m)
-    score, found, steps = _answers(maps, config, advance)
+    score, found, steps = _answers(maps, config, kernels, advance)
     if not found:
         raise ApartError(
             f"nowhere within {config.search_m:g} m do {config.overlap:.0%} of the footprint of the ground map lie on "
-            "the other map; get a larger piece of it, or search farther"
+            "the other map; get a larger piece of that one, or search farther"
         )
-    worth = [one for one in found if one.nats >= NEAR_BEST * found[0].nats]
-    tops = sorted([*(climb(score, one, *steps) for one in worth), *found[len(worth) :]], key=lambda one: -one.nats)
-    top, rival = tops[0], best_rival(tops, config)
+    worth = [one for one in found[:CANDIDATES] if one.nats >= NEAR_BEST * found[0].nats]
+    climbed = [climb(score, one, *steps) for one in worth]
+    top = max(climbed, key=lambda one: one.nats)
+    rival = best_rival(top, [*climbed, *found[len(worth) :]], config)
+    config = replace(config, margin_nats=config.margin_nats * chance_nats(found, config))
     flat = spread(score, top, config.rival_m, config.rival_deg) + np.diag(np.square([BIAS_M, BIAS_M, BIAS_RAD]))
     if [one.name for one in layers] == [STEMS] and fixed.stems_m is None:
         flat[0, 0] += config.crown_bias_m**2
@@ -88,19 +95,20 @@ def align(fixed: Scene, moved: Scene, config: AlignmentConfig, advance: Advance)
         covariance=_with_height(flat, vertical),
         vertical=vertical,
         margin_nats=top.nats - (rival.nats if rival else 0.0),
+        asked_nats=config.margin_nats,
         rival=rival,
-        shares=[_share(maps, one, top) for one in layers],
+        shares=[_share(maps, one, top, kernels) for one in layers],
         overlap=_overlap(fixed, moved, shift),
         doubts=doubts(top, rival, flat, stems, config),
     )
 
 
 def _answers(
-    maps: Maps, config: AlignmentConfig, advance: Advance
+    maps: Maps, config: AlignmentConfig, kernels: Kernels, advance: Advance
 ) -> tuple[Score, list[Candidate], tuple[float, float]]:
     """The score, candidates of it, and steps in metres and degrees that their tops lie within."""
     if config.method == "nmi":
-        score = information_score(maps, maps.layers[0], config)
+        score = information_score(maps, maps.layers[0], config, kernels)
         return (
             score,
             starts(score, config.search_m, config.search_deg, CANDIDATES, advance),
@@ -108,12 +116,12 @@ def _answers(
         )
     landscape = sweep(coarser(maps, COARSER), config.search_m, config.search_deg, config.overlap, advance)
     step_deg = float(landscape.yaws_deg[1] - landscape.yaws_deg[0])
-    return joint_score(maps), candidates(landscape, CANDIDATES), (COARSER * config.cell_m / 2, step_deg / 2)
+    return joint_score(maps, kernels), candidates(landscape, ANSWERS), (COARSER * config.cell_m / 2, step_deg / 2)
 
 
-def _share(maps: Maps, one: Layer, top: Candidate) -> Share:
+def _share(maps: Maps, one: Layer, top: Candidate, kernels: Kernels) -> Share:
     alone = Maps([one], maps.fixed, maps.moving, maps.pivot_m)
-    nats = float(joint_score(alone)(np.array([[top.x_m, top.y_m, top.yaw_deg]]))[0])
+    nats = float(joint_score(alone, kernels)(np.array([[top.x_m, top.y_m, top.yaw_deg]]))[0])
     return Share(one.name, nats, float(one.seen.sum() * one.independent))
 
 

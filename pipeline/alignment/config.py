@@ -32,7 +32,10 @@ class AlignmentConfig:
     """A pose farther away than this, or than `rival_deg`, is another answer."""
     rival_deg: float = 6.0
     margin_nats: float = 6.0
-    """Least log-likelihood ratio to the best other answer: 6 is odds of four hundred to one, were the model true."""
+    """Least log-likelihood ratio to the best other answer: 6 is odds of four hundred to one, were the model true. It is
+    asked for in units of what wrong answers lie apart among themselves, if that is more than a nat."""
     least_stems: int = 12
+    device: str = "cpu"
+    """Where candidate poses are scored; `cuda` takes PyTorch and a GPU."""
     crown_bias_m: float = 0.5
     """Crowns do not stand above their stems: sigma of that as an offset common to a plot, where only stems tell."""

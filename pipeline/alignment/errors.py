@@ -7,7 +7,8 @@ class AlignmentError(Exception):
     AlignmentError
     |-- CloudError        a file is not the cloud or the table it should be
     |-- FrameError        coordinate systems, units or axes of two maps do not fit
-    `-- ApartError        two maps share no place, or one holds nothing to align with
+    |-- ApartError        two maps share no place, or one holds nothing to align with
+    `-- DeviceError       the GPU that was asked for, or PyTorch, is not there
     """
 
 
@@ -21,3 +22,7 @@ class FrameError(AlignmentError):
 
 class ApartError(AlignmentError):
     """Nothing in common."""
+
+
+class DeviceError(AlignmentError):
+    """Poses cannot be scored where they were asked to be."""

@@ -8,15 +8,15 @@ from pipeline.alignment.config import AlignmentConfig
 from pipeline.alignment.fields import scaled
 from pipeline.alignment.grid import Array
 from pipeline.alignment.layers import Layer, samples
-from pipeline.alignment.nmi_kernels import pose_information
 from pipeline.alignment.refine import MOST_SAMPLES, Score, in_cells
 from pipeline.alignment.search import Advance, Candidate, Maps
+from pipeline.alignment.torch_kernels import Kernels
 
 START_M, START_DEG = 1.0, 2.5
 AT_ONCE = 2000
 
 
-def information_score(maps: Maps, stems: Layer, config: AlignmentConfig) -> Score:
+def information_score(maps: Maps, stems: Layer, config: AlignmentConfig, kernels: Kernels) -> Score:
     """Equation 4 of the stems' layer, as nats: what it exceeds 1 by, times joint entropy and independent cells.
 
     -inf where too little of the footprint overlaps: the information is biased upwards as cells get few.
@@ -28,7 +28,7 @@ def information_score(maps: Maps, stems: Layer, config: AlignmentConfig) -> Scor
     weight = stems.seen.sum() * stems.independent
 
     def score(poses: Array) -> Array:
-        found = pose_information(xy, levels, fixed, stems.known, in_cells(poses, at, maps.fixed.cell_m), config.bins)
+        found = kernels.information(xy, levels, fixed, stems.known, in_cells(poses, at, maps.fixed.cell_m), config.bins)
         nats = (found[:, 0] - 1.0) * float(np.median(found[:, 1])) * weight
         return np.where(found[:, 2] >= config.overlap * len(xy), nats, -np.inf)
 

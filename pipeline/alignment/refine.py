@@ -9,8 +9,8 @@ import numpy as np
 
 from pipeline.alignment.grid import Array
 from pipeline.alignment.layers import samples
-from pipeline.alignment.nmi_kernels import pose_sums
 from pipeline.alignment.search import Candidate, Maps
+from pipeline.alignment.torch_kernels import Kernels
 
 MOST_SAMPLES = 20_000
 SIDE = 5
@@ -29,7 +29,7 @@ class Basin:
     covariance: Array
 
 
-def joint_score(maps: Maps) -> Score:
+def joint_score(maps: Maps, kernels: Kernels) -> Score:
     """The sum of all layers' nats at any pose."""
     drawn = [samples(one, maps.moving, maps.pivot_m, MOST_SAMPLES) for one in maps.layers]
     thinned = [one.seen.sum() / max(len(index), 1) for one, (_, index) in zip(maps.layers, drawn, strict=True)]
@@ -40,7 +40,7 @@ def joint_score(maps: Maps) -> Score:
         total = np.zeros(len(poses))
         for one, (xy, index), times in zip(maps.layers, drawn, thinned, strict=True):
             values = np.ascontiguousarray(one.moving.ravel()[index])
-            total += one.nats(pose_sums(xy, values, one.fixed, one.known, moved) * times)
+            total += one.nats(kernels.sums(xy, values, one.fixed, one.known, moved) * times)
         return total
 
     return score

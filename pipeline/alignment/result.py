@@ -51,6 +51,7 @@ class Result(msgspec.Struct, frozen=True):
     covariance: list[list[float | None]]
     tilt_deg: float | None
     margin_nats: float
+    asked_nats: float
     rival: Rival | None
     nats: dict[str, float]
     overlap: float
@@ -94,6 +95,7 @@ def result(done: Done, version: str) -> Result:
         covariance=[[value if math.isfinite(value) else None for value in row] for row in covariance.tolist()],
         tilt_deg=found.vertical.tilt_deg if found.vertical else None,
         margin_nats=found.margin_nats,
+        asked_nats=found.asked_nats,
         rival=_rival(done) if rival is not None else None,
         nats={share.name: share.nats for share in found.shares},
         overlap=found.overlap,

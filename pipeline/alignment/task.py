@@ -17,6 +17,7 @@ from pipeline.alignment.frames import Placed, check_heights, place
 from pipeline.alignment.grid import Array, Grid
 from pipeline.alignment.scene import Scene, Source, aerial_scene, stem_scene, terrestrial_scene
 from pipeline.alignment.stem_table import read_stems
+from pipeline.alignment.torch_kernels import kernels_on
 from pipeline.alignment.transform import Transform
 
 Stage = Callable[[str], Callable[[float], None]]
@@ -58,6 +59,7 @@ class Done:
 
 def run(task: Task, stage: Stage) -> Done:
     """Raises `AlignmentError` of any kind."""
+    kernels_on(task.config.device)  # whether it is there at all, before minutes of reading
     if task.sessions:
         return _run_sessions(task, stage)
     aerial = _named(inspect(task.aerial), task.crs)
@@ -140,14 +142,15 @@ def _reached(moved: Scene, config: AlignmentConfig) -> Grid:
 
 
 def _named(cloud: Cloud, crs: str | None) -> Cloud:
-    if cloud.crs is not None or crs is None:
+    if crs is None:
         return cloud
     try:
-        return replace(cloud, crs=pyproj.CRS.from_user_input(crs))
+        named = pyproj.CRS.from_user_input(crs)
     except pyproj.exceptions.CRSError as error:
         raise FrameError(
             f"--crs {crs}: no coordinate system is known by that name; write EPSG:32612, for example"
         ) from error
+    return cloud if cloud.crs is not None else replace(cloud, crs=named)
 
 
 def _table_cloud(task: Task) -> Cloud:

@@ -12,15 +12,32 @@ from pipeline.alignment.grid import Array
 from pipeline.alignment.search import Candidate
 
 SIGMA_MOST_M, SIGMA_MOST_DEG = 1.0, 3.0
+TAIL = 20
+"""Other answers that tell how far chance carries one; where there are fewer, the model of the score is believed."""
 
 
-def best_rival(tops: Sequence[Candidate], config: AlignmentConfig) -> Candidate | None:
-    """The best of the tops that is another answer than the first."""
-    for one in tops[1:]:
-        metres, degrees = one.apart(tops[0])
-        if metres > config.rival_m or degrees > config.rival_deg:
-            return one
-    return None
+def best_rival(top: Candidate, answers: Sequence[Candidate], config: AlignmentConfig) -> Candidate | None:
+    """The best of the answers that is another one than the top."""
+    others = [one for one in answers if _another(one, top, config)]
+    return max(others, key=lambda one: one.nats, default=None)
+
+
+def chance_nats(answers: Sequence[Candidate], config: AlignmentConfig) -> float:
+    """What wrong answers lie apart among themselves; 1 if the model of the score were true, more for sparse fields.
+
+    The best of many have an exponential tail: its scale is their median excess over the next, by ln 2. Neither the
+    right answer at the head nor a few that lean on it matter to the median. answers: best first.
+    """
+    apart: list[Candidate] = []
+    for one in answers:
+        if all(_another(one, other, config) for other in apart):
+            apart.append(one)
+        if len(apart) == TAIL + 2:
+            break
+    if len(apart) < TAIL + 2:
+        return 1.0
+    nats = np.array([one.nats for one in apart[1:]])
+    return max(float(np.median(nats[:-1] - nats[-1])) / math.log(2.0), 1.0)
 
 
 def doubts(
@@ -35,10 +52,10 @@ def doubts(
         metres, degrees = rival.apart(top)
         found.append(
             f"another pose, {metres:.1f} m and {degrees:.0f} degrees away, explains the maps almost as well: "
-            f"{margin:.1f} nats between them, {config.margin_nats:g} are asked for"
+            f"{margin:.1f} nats between them, {config.margin_nats:.1f} are asked for"
         )
     elif margin < config.margin_nats:
-        found.append(f"the maps hardly answer to each other: {margin:.1f} nats, {config.margin_nats:g} are asked for")
+        found.append(f"the maps hardly answer to each other: {margin:.1f} nats, {config.margin_nats:.1f} are asked for")
     sigma = np.sqrt(np.diag(covariance))
     if sigma[:2].max() > SIGMA_MOST_M or math.degrees(sigma[2]) > SIGMA_MOST_DEG:
         found.append(f"the pose is known to {sigma[:2].max():.1f} m and {math.degrees(sigma[2]):.1f} degrees only")
@@ -47,3 +64,8 @@ def doubts(
     if config.search_deg < 180.0 and abs(top.yaw_deg) >= config.search_deg - 0.5:
         found.append(f"the best pose lies at the edge of the search of {config.search_deg:g} degrees: search wider")
     return found
+
+
+def _another(one: Candidate, other: Candidate, config: AlignmentConfig) -> bool:
+    metres, degrees = one.apart(other)
+    return metres > config.rival_m or degrees > config.rival_deg

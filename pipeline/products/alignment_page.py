@@ -94,7 +94,7 @@ def _facts(result: Result) -> dict[str, str]:
         "shift up": height,
         "turn, counter-clockwise": f"{result.yaw_deg:+.2f}°",
         "sigma": f"{result.sigma_m:.2f} m, {result.sigma_deg:.1f}°",
-        "ahead of the best other answer": f"{result.margin_nats:.1f} nats",
+        "ahead of the best other answer": f"{result.margin_nats:.1f} nats, {result.asked_nats:.1f} asked for",
         "best other answer": other,
         "footprint on the aerial map": f"{result.overlap:.0%}",
         "stems": str(result.stems),

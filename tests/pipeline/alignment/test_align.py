@@ -3,8 +3,10 @@ import pytest
 
 from benchmarks.alignment.stands import from_the_air, from_the_ground, grow, write_las
 from pipeline.alignment.config import AlignmentConfig
+from pipeline.alignment.search import Candidate
 from pipeline.alignment.task import Task, run
 from pipeline.alignment.transform import Transform
+from pipeline.alignment.verdict import chance_nats
 
 OFF = Transform((500_001.0, 5_400_002.0), 3.2, -4.1, 1.7, 9.0)
 SEARCH = AlignmentConfig(search_m=7.0, search_deg=15.0)
@@ -63,17 +65,50 @@ def test_another_stand_is_not_taken_for_this_one(tmp_path):
     assert not run(Task(air, ground, SEARCH), lambda _: lambda _: None).alignment.sure
 
 
-def test_two_walks_in_one_stand_find_each_other_without_any_coordinates(tmp_path):
-    stand = grow("mixed", 6, side_m=70.0)
-    local = Transform((500_000.0, 5_400_000.0), 500_000.0, 5_400_000.0, 480.0, 140.0)
-    monday = write_las(tmp_path / "monday.laz", from_the_ground(stand, 16.0, OFF, crowns=False), None)
-    other = from_the_ground(stand, 16.0, local, crowns=False, at_m=(9.0, 5.0))
-    tuesday = write_las(tmp_path / "tuesday.laz", other, None)
-    done = run(Task(monday, tuesday, AlignmentConfig(), sessions=True), lambda _: lambda _: None)
-    assert done.alignment.sure, done.alignment.doubts
+def walked(folder, stand, at_m=(0.0, 0.0), radius_m=16.0, yaw_deg=140.0):
+    """Two walks of which the second lies in a local frame, and the transform that is looked for."""
+    local = Transform((500_000.0, 5_400_000.0), 500_000.0, 5_400_000.0, 480.0, yaw_deg)
+    first = write_las(folder / "monday.laz", from_the_ground(stand, radius_m, OFF, crowns=False), None)
+    seen = from_the_ground(stand, radius_m, local, crowns=False, at_m=at_m, walk=1, missed=0.1)
+    done = run(
+        Task(first, write_las(folder / "tuesday.laz", seen, None), AlignmentConfig(), sessions=True),
+        lambda _: lambda _: None,
+    )
     into = done.alignment.transform.after(done.placed.start)
-    expected = OFF.inverse().apply(local.apply(other[::50]))
-    assert np.abs(into.apply(other[::50]) - expected).max() < 0.4
+    return done.alignment, into.apply(seen[::50]), OFF.inverse().apply(local.apply(seen[::50]))
+
+
+@pytest.mark.parametrize("yaw_deg", [140.0, -65.0])
+def test_two_walks_in_one_stand_find_each_other_without_any_coordinates(tmp_path, yaw_deg):
+    found, moved, expected = walked(tmp_path, grow("mixed", 6, side_m=60.0), (9.0, 5.0), 14.0, yaw_deg)
+    assert found.sure, found.doubts
+    assert np.abs(moved - expected).max() < 0.4
+
+
+def test_two_walks_that_share_no_place_are_refused(tmp_path):
+    found, *_ = walked(tmp_path, grow("mixed", 0, side_m=90.0), (30.0, 10.0), 14.0)
+    assert any("another pose" in doubt for doubt in found.doubts)
+
+
+def test_two_walks_along_the_rows_of_a_plantation_are_refused(tmp_path):
+    found, *_ = walked(tmp_path, grow("rows", 2, side_m=60.0, relief_m=0.0), (6.0, 2.0), 12.0)
+    assert any("another pose" in doubt for doubt in found.doubts)
+
+
+@pytest.mark.parametrize(("scale", "count", "expected"), [(3.0, 400, 3.0), (0.5, 400, 1.0), (3.0, 15, 1.0)])
+def test_what_chance_answers_lie_apart_is_the_scale_of_their_tail(scale, count, expected):
+    random = np.random.default_rng(12)
+    drawn = np.sort(random.exponential(scale, (200, count)))[:, ::-1]
+    places = random.uniform(-2000, 2000, (count + 1, 2)).tolist()
+    right = Candidate(*places[0], 0.0, 99.0)
+    found = [
+        chance_nats(
+            [right, *(Candidate(*at, 0.0, n) for at, n in zip(places[1:], nats.tolist(), strict=True))],
+            AlignmentConfig(),
+        )
+        for nats in drawn
+    ]
+    assert np.mean(found) == pytest.approx(expected, rel=0.1)
 
 
 def test_a_transform_and_its_inverse_leave_nothing():
