@@ -16,8 +16,8 @@ from edge.cli import exit_codes
 from edge.cli.words import console
 from edge.errors import EdgeError, FormatError
 from pipeline.evaluation.diameters import DiameterErrors, Diameters, diameter_errors, paired
-from pipeline.inventory.device import read_field_list
 from pipeline.inventory.errors import InventoryError
+from pipeline.inventory.field_list import read_field_list
 from pipeline.products import sheet
 from pipeline.products.plots import Dots, Line, Plot
 
@@ -50,7 +50,7 @@ def read_diameters(estimate: Path, field: Path) -> Diameters:
     except (OSError, KeyError, ValueError) as error:
         raise FormatError(f"{table}: not what `mapforest inventory` writes ({error!r})") from error
     try:
-        taped = read_field_list(field)
+        taped = read_field_list(field).on_map(None)
     except InventoryError as error:
         raise EdgeError(str(error)) from error
     figures = figures.reshape(-1, 4)
