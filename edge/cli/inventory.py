@@ -20,6 +20,7 @@ example: mapforest inventory recordings/20261124T101500Z_walk
          mapforest inventory plot.laz --marked taped_trees.csv
          mapforest inventory plot.ply --output plot_trees --no-laz
          mapforest inventory plot.laz --field-list plot_17.csv
+         mapforest inventory recordings/20261124T101500Z_walk --april-tags --field-list plot_17.csv
 
 Takes a session that was processed, or a map as LAS, LAZ or PLY in metres. Writes trees.gpkg, trees.csv, rejected.csv
 (with the reasons), a page with stem map and slices, trees.laz, and tree_edits.csv: there you confirm, add and delete
@@ -40,6 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="trees with numbers (tag, dbh_cm, perhaps species; x and y, lon and lat, or azimuth_deg and distance_m): "
         "matched by how they stand among each other",
     )
+    parser.add_argument(
+        "--april-tags",
+        action="store_true",
+        help="read AprilTags (36h11) on stems in the session's video as tree numbers",
+    )
     parser.add_argument("--device-bias", type=Path, metavar="FILE", help="device_bias.json of an earlier run")
     parser.add_argument("--no-laz", action="store_true", help="leave out trees.laz")
 
@@ -49,7 +55,9 @@ def run(args: argparse.Namespace) -> int:
     from edge.inventory.run import Asked, run_inventory
     from pipeline.inventory.errors import InventoryError
 
-    asked = Asked(args.map, args.output, args.marked, args.device_bias, args.field_list, not args.no_laz)
+    asked = Asked(
+        args.map, args.output, args.marked, args.device_bias, args.field_list, args.april_tags, not args.no_laz
+    )
     out = console(stderr=args.json)
     try:
         with StageBar(quiet=args.json) as bar:

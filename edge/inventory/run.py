@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -11,14 +11,16 @@ import numpy as np
 
 from edge.config import Config
 from edge.errors import EdgeError, FormatError
+from edge.inventory.april_tags import read_april_tags
 from edge.inventory.maps import Found, find_map
 from edge.process.checkpoint import alone
 from edge.process.product_facts import whole
 from edge.process.watch import Watch
+from pipeline.inventory.april_tags import Sighting
 from pipeline.inventory.device import DeviceBias, corrected, fit_device_bias
 from pipeline.inventory.field_list import read_field_list
 from pipeline.inventory.inventory import Inventory, take_inventory
-from pipeline.inventory.tagged import FieldMatch, Tagged, with_field_list
+from pipeline.inventory.tagged import FieldMatch, Tagged, with_april_tags, with_field_list
 from pipeline.inventory.trees import (
     EDIT_COLUMNS,
     EDITS_HEAD,
@@ -48,7 +50,7 @@ MOST_ON_A_PAGE = 400
 class Asked:
     """marked: a field list of taped trees in the map's coordinates. bias: a file that an earlier run with one wrote.
 
-    field_list: of trees with numbers, in any frame.
+    field_list: of trees with numbers, in any frame. april_tags: look for them in the session's video.
     """
 
     target: Path
@@ -56,6 +58,7 @@ class Asked:
     marked: Path | None = None
     bias: Path | None = None
     field_list: Path | None = None
+    april_tags: bool = False
     laz: bool = True
 
 
@@ -68,6 +71,7 @@ class InventoryFacts(msgspec.Struct):
     trees: int
     rejected: int
     taped: int
+    tagged: int
     with_species: int
     why: str = ""
     """Where there are no trees: what was there instead."""
@@ -88,6 +92,7 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     edits = read_edits(folder / EDITS) if (folder / EDITS).exists() else []
     listed_trees = read_field_list(asked.field_list) if asked.field_list is not None else None
     with alone(folder):
+        seen, notes = _april_tags(asked, config, watch)
         watch.stage("stems", done=False)
         measured = take_inventory(found.source, config.inventory, watch.advance, folder)
         given = listed(measured, found.source)
@@ -95,10 +100,11 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
         bias = _bias(asked, trees, found)
         if bias is not None:
             trees = corrected(trees, bias)
-        given, tagged = TreeList(trees, given.rejected), None
+        trees, lost = with_april_tags(trees, seen)
+        given, tagged = TreeList(trees, given.rejected, (*given.notes, *notes, *lost)), None
         if listed_trees is not None:
             tagged = with_field_list(given, listed_trees, found.source)
-            given = TreeList(tagged.trees, given.rejected)
+            given = replace(given, trees=tagged.trees)
         given = edited(given, edits)
         facts = _facts(found, measured, given, bias)
         _write(folder, given, facts, found)
@@ -111,6 +117,13 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
         with whole(folder / FACTS) as path:
             path.write_bytes(msgspec.json.format(msgspec.json.encode(facts), indent=2) + b"\n")
     return folder, facts
+
+
+def _april_tags(asked: Asked, config: Config, watch: Watch) -> tuple[list[Sighting], tuple[str, ...]]:
+    if not asked.april_tags:
+        return [], ()
+    watch.stage("april tags", done=False)
+    return read_april_tags(asked.target, config, watch.advance)
 
 
 def _bias(asked: Asked, trees: Sequence[ListedTree], found: Found) -> DeviceBias | None:
@@ -133,6 +146,7 @@ def _facts(found: Found, measured: Inventory, given: TreeList, bias: DeviceBias 
         trees=len(given.trees),
         rejected=len(given.rejected),
         taped=sum(tree.stem is not None and tree.stem.taped for tree in given.trees),
+        tagged=sum(bool(tree.tag) for tree in given.trees),
         with_species=sum(bool(np.isfinite(tree.probability)) for tree in given.trees),
         why=measured.why,
         device_bias=bias,

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.inventory.april_tags import Sighting, on_stems
 from pipeline.inventory.constellation import Constellation, match
 from pipeline.inventory.field_list import FieldList, FieldTree
 from pipeline.inventory.source import MapSource
@@ -79,6 +80,17 @@ def with_field_list(given: TreeList, field: FieldList, source: MapSource) -> Tag
         found.rms_m, found.margin_nats, found.why,
     )  # fmt: skip
     return Tagged(trees, told, unmatched)
+
+
+def with_april_tags(trees: Sequence[ListedTree], seen: Sequence[Sighting]) -> tuple[list[ListedTree], tuple[str, ...]]:
+    """The numbers on the stems that they were seen on, and in words which hang on none. seen: in the map's frame before
+    it is placed."""
+    rows = [k for k, tree in enumerate(trees) if tree.stem is not None]
+    hung, notes = on_stems(seen, [stem for tree in trees if (stem := tree.stem) is not None])
+    out = list(trees)
+    for row, number in hung.items():
+        out[rows[row]] = replace(out[rows[row]], tag=str(number))
+    return out, notes
 
 
 def same_tag(one: str, other: str) -> bool:

@@ -115,3 +115,8 @@ def test_a_field_list_by_compass_and_tape_numbers_the_trees(plot, tmp_path, caps
         assert float(trees[str(number)]["field_dbh_cm"]) == pytest.approx(100 * trunk.dbh, abs=0.1)
     with (folder / "field_unmatched.csv").open() as file:
         assert [(row["tag"], row["why"]) for row in csv.DictReader(file)] == [("99", "no stem was found there")]
+
+
+def test_april_tags_of_a_map_without_video_are_refused_at_once(plot, tmp_path, capsys):
+    assert main(["inventory", str(plot), "--april-tags", "--output", str(tmp_path / "out")]) == exit_codes.FAILED
+    assert "in the video of a session" in capsys.readouterr().err
