@@ -74,7 +74,9 @@ def match(
     if min(len(listed.dbh_m), len(mapped.dbh_m)) < LEAST_PAIRS:
         return _refused(f"{len(listed.dbh_m)} listed and {len(mapped.dbh_m)} measured trees: too few to tell by")
     chance = _Chance(listed, mapped, given, same_frame)
-    poses = _proposals(listed, mapped, given)
+    poses = _proposals(listed, mapped, given[:0])
+    if len(given):  # beside the others: a tag may hang on the wrong stem
+        poses = np.vstack([poses, _proposals(listed, mapped, given)])
     if same_frame:
         poses = np.vstack([poses, np.zeros((1, 3))])
     if not len(poses):

@@ -48,10 +48,10 @@ def test_a_list_without_bearing_or_place_is_matched_though_trees_are_missing_on_
 
 
 def test_what_fits_in_more_than_one_place_is_refused():
-    grid = np.array([[x, y] for x in np.arange(0, 40, 3.0) for y in np.arange(0, 40, 3.0)])
+    grid = np.array([[x, y] for x in np.arange(0, 30, 3.0) for y in np.arange(0, 30, 3.0)])
     plantation = Constellation(grid, np.full(len(grid), 0.25))
-    near = np.hypot(*(grid - 18.0).T) < 9
-    found = match(Constellation(grid[near] - 18.0, np.full(near.sum(), 0.25)), plantation)
+    near = np.hypot(*(grid - 15.0).T) < 8
+    found = match(Constellation(grid[near] - 15.0, np.full(near.sum(), 0.25)), plantation)
     assert "more than one place" in found.why
     assert len(found.pairs) == 0
 
@@ -64,15 +64,25 @@ def test_a_list_of_another_wood_and_one_of_few_trees_are_refused():
 
 
 def test_tags_that_were_read_decide_where_the_rest_does_not():
-    grid = np.array([[x, y] for x in np.arange(0, 40, 3.0) for y in np.arange(0, 40, 3.0)])
-    near = np.flatnonzero(np.hypot(*(grid - 18.0).T) < 9)
+    grid = np.array([[x, y] for x in np.arange(0, 30, 3.0) for y in np.arange(0, 30, 3.0)])
+    near = np.flatnonzero(np.hypot(*(grid - 15.0).T) < 8)
     known = [(3, near[3]), (20, near[20])]
     found = match(
-        Constellation(grid[near] - 18.0, np.full(len(near), 0.25)), Constellation(grid, np.full(len(grid), 0.25)), known
+        Constellation(grid[near] - 15.0, np.full(len(near), 0.25)), Constellation(grid, np.full(len(grid), 0.25)), known
     )
     assert not found.why
     np.testing.assert_array_equal(found.pairs[:, 1], near[found.pairs[:, 0]])
     assert len(found.pairs) == len(near)
+
+
+def test_a_tag_on_the_wrong_stem_does_not_lead_astray():
+    places, dbh = stand(8)
+    listed, rows = survey(8, places, dbh)
+    astray = int(np.argmax(np.hypot(*(places - 25.0).T)))
+    found = match(listed, Constellation(places, dbh), [(0, astray)])
+    assert not found.why
+    assert (0, astray) not in set(map(tuple, found.pairs.tolist()))
+    assert all(rows[row] == k for row, k in found.pairs)
 
 
 def test_coordinates_of_the_map_tell_where_few_trees_do_not():
