@@ -1,6 +1,7 @@
 """Stems and diameters on simulated plots, mapped by our own odometry, against those that stand there.
 
     python -m benchmarks.inventory --cache DIR [--densities open mixed dense] [--seeds 1 2 3 4 5] [--voxel 0.02]
+    python -m benchmarks.inventory --real DIR --peers-python PYTHON    real plots, beside dendromatics
 
 A plot is a walk of 45 m, mapped once (a minute) and kept. Completeness: of the stems above 10 cm within 15 m of the
 way. Commission: of the stems found within 15 m, those where nothing stands. Diameters: of the matched ones above 10 cm.
@@ -16,13 +17,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from benchmarks.inventory.plots import DENSITIES, TILES, TRACK, Plot, plot
+from benchmarks.inventory import real
+from benchmarks.inventory.plots import DENSITIES, BesideWay, Plot, plot
 from pipeline.evaluation.diameters import DiameterErrors, Diameters, diameter_errors, together
 from pipeline.inventory.config import InventoryConfig
 from pipeline.inventory.inventory import take_inventory
 from pipeline.inventory.stem import BREAST_M
-from pipeline.inventory.tilemap import TileMap
-from pipeline.products.track import read_track
 
 WITHIN_M, LEAST_DBH_M = 15.0, 0.10
 ROW = "| {} | {} | {} | {} | {:.3f} | {} | {:.3f} | {:.2f} | {:+.2f} | {:.2f} | {:.0%} | {:.0f} |"
@@ -30,6 +30,10 @@ ROW = "| {} | {} | {} | {} | {:.3f} | {} | {:.3f} | {:.2f} | {:+.2f} | {:.2f} | 
 
 def main() -> None:
     options = _options()
+    if options.real is not None:
+        for row in real.rows(options.real, options.peers_python):
+            print(row, flush=True)
+        return
     print("| density | seed | stems | found | completeness | made up | MRE | RMSE cm | bias cm | z rms | in 95 % | s |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for density in options.densities:
@@ -45,8 +49,7 @@ def main() -> None:
 
 def measured(one: Plot, voxel_m: float) -> Diameters:
     """What is found within reach of the way beside what stands there, in the frame of the simulated world."""
-    track = read_track(one.folder / TRACK)
-    found = take_inventory(TileMap(one.folder / TILES, voxel_m, track["position_m"], None), InventoryConfig())
+    found = take_inventory(BesideWay(one, voxel_m), InventoryConfig())
     turn, shift = one.into_world()
     axes = np.array([[*s.axis_at(BREAST_M), s.base_m[2] + BREAST_M] for s in found.stems]).reshape(-1, 3)
     places = (axes @ turn.T + shift)[:, :2]
@@ -69,11 +72,16 @@ def _row(density: str, seed: str, e: DiameterErrors, took_s: float) -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cache", type=Path, required=True, help="where mapped walks are kept")
+    parser.add_argument("--cache", type=Path, help="where mapped walks are kept")
+    parser.add_argument("--real", type=Path, metavar="DIR", help="instead: the real plots in a folder")
+    parser.add_argument("--peers-python", type=Path, metavar="FILE", help="of an environment with dendromatics")
     parser.add_argument("--densities", nargs="+", default=list(DENSITIES), choices=list(DENSITIES))
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])
     parser.add_argument("--voxel", type=float, default=0.02, metavar="M", help="the map keeps one point in each cube")
-    return parser.parse_args()
+    options = parser.parse_args()
+    if (options.cache is None) == (options.real is None) or (options.real is None) != (options.peers_python is None):
+        parser.error("give --cache, or --real and --peers-python")
+    return options
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 from math import isfinite
 from pathlib import Path
 
@@ -14,18 +13,15 @@ from rich.table import Table
 
 from edge.cli import exit_codes
 from edge.cli.words import console
-from edge.errors import EdgeError, FormatError
+from edge.errors import EdgeError
+from edge.inventory.against_truth import read_diameters
 from pipeline.evaluation.diameters import DiameterErrors, Diameters, diameter_errors, paired
-from pipeline.inventory.device import read_field_list
-from pipeline.inventory.errors import InventoryError
 from pipeline.products import sheet
 from pipeline.products.plots import Dots, Line, Plot
 
-TREES = "trees.csv"
-
 
 def run(args: argparse.Namespace) -> int:
-    """Of a folder or table of `mapforest inventory`, against a field list."""
+    """Of a session, or of a folder or table of `mapforest inventory`, against a field list or a simulation's truth."""
     given = read_diameters(args.estimate, args.truth)
     found = diameter_errors(given, args.least / 100.0)
     if args.page is not None:
@@ -36,27 +32,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(console(), found)
     return exit_codes.GOOD
-
-
-def read_diameters(estimate: Path, field: Path) -> Diameters:
-    """FormatError, EdgeError name the file and what was expected."""
-    table = estimate / TREES if estimate.is_dir() else estimate
-    if estimate.is_dir() and not table.exists() and (estimate / "products" / "inventory" / TREES).exists():
-        table = estimate / "products" / "inventory" / TREES
-    try:
-        with table.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.DictReader(file) if row["status"] != "added"]
-        figures = np.array([[float(row[k] or "nan") for k in ("x", "y", "dbh_cm", "dbh_sd_cm")] for row in rows])
-    except (OSError, KeyError, ValueError) as error:
-        raise FormatError(f"{table}: not what `mapforest inventory` writes ({error!r})") from error
-    try:
-        taped = read_field_list(field)
-    except InventoryError as error:
-        raise EdgeError(str(error)) from error
-    figures = figures.reshape(-1, 4)
-    at = np.array([[one.x_m, one.y_m] for one in taped])
-    dbh = np.array([one.dbh_m for one in taped])
-    return Diameters(figures[:, :2], figures[:, 2] / 100, figures[:, 3] / 100, at, dbh, np.ones(len(dbh), np.bool_))
 
 
 def show(out: Console, found: DiameterErrors) -> None:

@@ -33,6 +33,7 @@ example: mapforest evaluate clocks demo/recordings/20261124T101500Z_demo --truth
          mapforest evaluate trees demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate alignment plot7_aligned --truth truth.txt
          mapforest evaluate diameters plot_inventory --truth field_list.csv --page diameters.html
+         mapforest evaluate diameters demo/recordings/20261124T101500Z_demo --truth demo/truth
          mapforest evaluate detection models/ailanthus.onnx datasets/autumn --page curves.html --worst worst.jpg
          mapforest evaluate map recordings/20261124T101500Z_walk --control surveyed.csv
          mapforest evaluate map walk.laz --reference scanned.laz
@@ -45,8 +46,9 @@ whether their covariances allow for that.
 trees: the trees that `mapforest process` mapped, against those of the simulated forest that the camera saw.
 alignment: what `mapforest align` wrote (or a folder of many), against another alignment.json or a text of X Y Z YAW:
 errors at the middle of the footprint, and over covariance (3 is expected of plan and turn together).
-diameters: what `mapforest inventory` measured, against a field list (CSV with x, y, dbh_cm in the map's coordinates):
-MRE, RMSE, bias, completeness and commission, a scatter plot.
+diameters: what `mapforest inventory` measured, against a field list (CSV with x, y, dbh_cm in the map's coordinates),
+or a session's against the stems from 10 cm within 15 m of the emulated payload's way: MRE, RMSE, bias, completeness and
+commission, a scatter plot.
 detection: an ONNX model ("demo" for ours), or a folder of another program's predictions (YOLO texts with confidences),
 against a folder with images/, labels/, classes.txt and, to be told by site, sites.csv (image,site): precision, recall
 and F1 at one confidence, average precisions as COCO's, confusion, intervals from sites drawn anew.

@@ -19,6 +19,8 @@ HELP = """stems, diameters, heights and crowns from a map
 example: mapforest inventory recordings/20261124T101500Z_walk
          mapforest inventory plot.laz --marked taped_trees.csv
          mapforest inventory plot.ply --output plot_trees --no-laz
+         mapforest inventory plot.laz --field-list plot_17.csv
+         mapforest inventory recordings/20261124T101500Z_walk --april-tags --field-list plot_17.csv
 
 Takes a session that was processed, or a map as LAS, LAZ or PLY in metres. Writes trees.gpkg, trees.csv, rejected.csv
 (with the reasons), a page with stem map and slices, trees.laz, and tree_edits.csv: there you confirm, add and delete
@@ -32,6 +34,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--marked", type=Path, metavar="CSV", help="field list of taped trees (x, y, dbh_cm): fits the device's bias"
     )
+    parser.add_argument(
+        "--field-list",
+        type=Path,
+        metavar="CSV",
+        help="trees with numbers (tag, dbh_cm, perhaps species; x and y, lon and lat, or azimuth_deg and distance_m): "
+        "matched by how they stand among each other",
+    )
+    parser.add_argument(
+        "--april-tags",
+        action="store_true",
+        help="read AprilTags (36h11) on stems in the session's video as tree numbers",
+    )
     parser.add_argument("--device-bias", type=Path, metavar="FILE", help="device_bias.json of an earlier run")
     parser.add_argument("--no-laz", action="store_true", help="leave out trees.laz")
 
@@ -41,7 +55,9 @@ def run(args: argparse.Namespace) -> int:
     from edge.inventory.run import Asked, run_inventory
     from pipeline.inventory.errors import InventoryError
 
-    asked = Asked(args.map, args.output, args.marked, args.device_bias, not args.no_laz)
+    asked = Asked(
+        args.map, args.output, args.marked, args.device_bias, args.field_list, args.april_tags, not args.no_laz
+    )
     out = console(stderr=args.json)
     try:
         with StageBar(quiet=args.json) as bar:
@@ -52,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
         print(msgspec.json.encode({"folder": str(folder), **msgspec.to_builtins(facts)}).decode())
         return exit_codes.GOOD if facts.trees else exit_codes.WARNINGS
     out.print(f"[bold]{escape(facts.map)}[/]: {facts.trees} trees, {facts.rejected} rejected, {facts.points:,} points")
+    if facts.field_list is not None:
+        out.print(f"  {facts.field_list.matched} of {facts.field_list.listed} trees of the field list", highlight=False)
     for note in (facts.why, *facts.notes):
         if note:
             out.print(f"  {escape(note)}", highlight=False)

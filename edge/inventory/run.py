@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -11,12 +11,16 @@ import numpy as np
 
 from edge.config import Config
 from edge.errors import EdgeError, FormatError
+from edge.inventory.april_tags import read_april_tags
 from edge.inventory.maps import Found, find_map
 from edge.process.checkpoint import alone
 from edge.process.product_facts import whole
 from edge.process.watch import Watch
-from pipeline.inventory.device import DeviceBias, corrected, fit_device_bias, read_field_list
+from pipeline.inventory.april_tags import Sighting
+from pipeline.inventory.device import DeviceBias, corrected, fit_device_bias
+from pipeline.inventory.field_list import read_field_list
 from pipeline.inventory.inventory import Inventory, take_inventory
+from pipeline.inventory.tagged import FieldMatch, Tagged, with_april_tags, with_field_list
 from pipeline.inventory.trees import (
     EDIT_COLUMNS,
     EDITS_HEAD,
@@ -29,9 +33,14 @@ from pipeline.inventory.trees import (
 )
 from pipeline.products.inventory_laz import write_inventory_laz
 from pipeline.products.inventory_page import write_plot_page
-from pipeline.products.inventory_tables import write_rejected_csv, write_trees_csv, write_trees_gpkg
+from pipeline.products.inventory_tables import (
+    write_rejected_csv,
+    write_trees_csv,
+    write_trees_gpkg,
+    write_unmatched_csv,
+)
 
-EDITS, BIAS, FACTS = "tree_edits.csv", "device_bias.json", "inventory.json"
+EDITS, BIAS, FACTS, UNMATCHED = "tree_edits.csv", "device_bias.json", "inventory.json", "field_unmatched.csv"
 PLOT_M = 50.0
 MOST_ON_A_PAGE = 400
 """Trees; beyond, each square of `PLOT_M` with trees has a page of its own."""
@@ -39,12 +48,17 @@ MOST_ON_A_PAGE = 400
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """marked: a field list of taped trees. bias: a file that an earlier run with one wrote."""
+    """marked: a field list of taped trees in the map's coordinates. bias: a file that an earlier run with one wrote.
+
+    field_list: of trees with numbers, in any frame. april_tags: look for them in the session's video.
+    """
 
     target: Path
     output: Path | None = None
     marked: Path | None = None
     bias: Path | None = None
+    field_list: Path | None = None
+    april_tags: bool = False
     laz: bool = True
 
 
@@ -57,10 +71,12 @@ class InventoryFacts(msgspec.Struct):
     trees: int
     rejected: int
     taped: int
+    tagged: int
     with_species: int
     why: str = ""
     """Where there are no trees: what was there instead."""
     device_bias: DeviceBias | None = None
+    field_list: FieldMatch | None = None
     notes: tuple[str, ...] = ()
     files: dict[str, str] = {}
 
@@ -74,17 +90,25 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     except OSError as error:
         raise EdgeError(f"{folder}: cannot be made ({error.strerror}); give another place with --output") from error
     edits = read_edits(folder / EDITS) if (folder / EDITS).exists() else []
+    listed_trees = read_field_list(asked.field_list) if asked.field_list is not None else None
     with alone(folder):
+        seen, notes = _april_tags(asked, config, watch)
         watch.stage("stems", done=False)
         measured = take_inventory(found.source, config.inventory, watch.advance, folder)
         given = listed(measured, found.source)
         trees = with_detections(given.trees, found.detected or [], found.source)
-        bias = _bias(asked, trees)
+        bias = _bias(asked, trees, found)
         if bias is not None:
             trees = corrected(trees, bias)
-        given = edited(TreeList(trees, given.rejected), edits)
+        trees, lost = with_april_tags(trees, seen)
+        given, tagged = TreeList(trees, given.rejected, (*given.notes, *notes, *lost)), None
+        if listed_trees is not None:
+            tagged = with_field_list(given, listed_trees, found.source)
+            given = replace(given, trees=tagged.trees)
+        given = edited(given, edits)
         facts = _facts(found, measured, given, bias)
         _write(folder, given, facts, found)
+        _write_field_list(folder, tagged, facts)
         if asked.laz:
             watch.stage("map", done=False)
             with whole(folder / "trees.laz") as path:
@@ -95,9 +119,16 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     return folder, facts
 
 
-def _bias(asked: Asked, trees: Sequence[ListedTree]) -> DeviceBias | None:
+def _april_tags(asked: Asked, config: Config, watch: Watch) -> tuple[list[Sighting], tuple[str, ...]]:
+    if not asked.april_tags:
+        return [], ()
+    watch.stage("april tags", done=False)
+    return read_april_tags(asked.target, config, watch.advance)
+
+
+def _bias(asked: Asked, trees: Sequence[ListedTree], found: Found) -> DeviceBias | None:
     if asked.marked is not None:
-        return fit_device_bias(trees, read_field_list(asked.marked))
+        return fit_device_bias(trees, read_field_list(asked.marked).on_map(found.source.crs))
     if asked.bias is None:
         return None
     try:
@@ -115,6 +146,7 @@ def _facts(found: Found, measured: Inventory, given: TreeList, bias: DeviceBias 
         trees=len(given.trees),
         rejected=len(given.rejected),
         taped=sum(tree.stem is not None and tree.stem.taped for tree in given.trees),
+        tagged=sum(bool(tree.tag) for tree in given.trees),
         with_species=sum(bool(np.isfinite(tree.probability)) for tree in given.trees),
         why=measured.why,
         device_bias=bias,
@@ -143,6 +175,20 @@ def _write(folder: Path, given: TreeList, facts: InventoryFacts, found: Found) -
     if not (folder / EDITS).exists():
         (folder / EDITS).write_text(EDITS_HEAD + ",".join(EDIT_COLUMNS) + "\n", encoding="utf-8")
     files[EDITS] = "yours: confirm, add and delete trees; the next run begins with it"
+
+
+def _write_field_list(folder: Path, tagged: Tagged | None, facts: InventoryFacts) -> None:
+    """What could not be matched; a table of an earlier run does not stay behind."""
+    (folder / UNMATCHED).unlink(missing_ok=True)
+    if tagged is None:
+        return
+    facts.field_list = tagged.match
+    if tagged.match.why:
+        facts.notes += (f"the field list was not matched: {tagged.match.why}",)
+    if tagged.unmatched:
+        with whole(folder / UNMATCHED) as path:
+            write_unmatched_csv(path, tagged.unmatched)
+        facts.files[UNMATCHED] = f"{len(tagged.unmatched)} trees of the field list without a stem"
 
 
 def _pages(given: TreeList) -> list[tuple[str, str, TreeList]]:

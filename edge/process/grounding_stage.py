@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from edge.process import fusion_stage, odometry_stage
+from edge.process.camera_way import CameraWay
 from edge.process.detections_file import DETECTIONS, read_detections
 from edge.process.fusion_stage import read_placement
 from edge.process.places import Places
@@ -19,12 +20,10 @@ from edge.process.trees_file import EVIDENCE, FACTS, SEARCHED, TREES, GroundingF
 from pipeline.detections import FrameDetections
 from pipeline.grounding.config import GroundingConfig
 from pipeline.grounding.grounding import Grounding
-from pipeline.grounding.placed import to_map
 from pipeline.grounding.sources import TilePoints
-from pipeline.grounding.views import CameraRig, Pose, camera_view
-from pipeline.products.covariance import horizontal_sigma_m
+from pipeline.grounding.views import CameraRig
 from pipeline.products.coverage import CoverageGrid
-from pipeline.products.track import Placement, read_track
+from pipeline.products.track import read_track
 from pipeline.trees import Tree
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +54,7 @@ class GroundingStage:
         odometry = self.places.odometry
         tiles = TilePoints(odometry / odometry_stage.TILES, self.tile_m, POINTS_M)
         grounding = Grounding(tiles, msgspec.structs.replace(self.config, target=target))
-        where = _Where(read_track(odometry / odometry_stage.TRACK), placement, self.rig)
+        where = CameraWay(read_track(odometry / odometry_stage.TRACK), placement, self.rig)
         searched = _Searched(grounding, where)
         for k, frame in enumerate(frames):
             facts.lost += not searched.look(frame)
@@ -83,35 +82,10 @@ class GroundingStage:
             facts.notes += (f"{facts.blind} images with no LiDAR points around were left out",)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Where:
-    """The way of a session, in `odom` and, by the placement, in `map`."""
-
-    track: npt.NDArray[np.void]
-    placement: Placement | None
-    rig: CameraRig
-
-    def sweep(self, frame: FrameDetections) -> int | None:
-        """The first one after the exposure; None where there is none before or after."""
-        exposed_ns = frame.stamp_ns - round(self.rig.late_s * 1e9)
-        after = int(np.searchsorted(self.track["stamp_ns"], exposed_ns))
-        return after if 0 < after < len(self.track) else None
-
-    def points(self, odom_m: Array, sweeps: npt.NDArray[np.integer]) -> Array:
-        return odom_m if self.placement is None else self.placement.points(odom_m, sweeps)
-
-    def sigma_m(self, sweep: int) -> float:
-        covariance = self.track["covariance"] if self.placement is None else self.placement.covariance
-        return float(horizontal_sigma_m(covariance[sweep : sweep + 1])[0])
-
-    def placed(self, trees: list[Tree]) -> list[Tree]:
-        return trees if self.placement is None else to_map(trees, self.placement, self.track["stamp_ns"])
-
-
 class _Searched:
     """Looks through a session's images, and keeps where they looked."""
 
-    def __init__(self, grounding: Grounding, where: _Where) -> None:
+    def __init__(self, grounding: Grounding, where: CameraWay) -> None:
         self._grounding = grounding
         self._where = where
         self._grid = CoverageGrid()
@@ -121,13 +95,10 @@ class _Searched:
     def look(self, frame: FrameDetections) -> bool:
         """False where the image cannot be put on the map."""
         where = self._where
-        sweep = where.sweep(frame)
-        rig = where.rig.for_images(frame.width_px, frame.height_px)
-        if sweep is None or rig is None:
+        found = where.view(frame.stamp_ns, frame.width_px, frame.height_px)
+        if found is None:
             return False
-        view = camera_view(frame.stamp_ns, _pose(where.track[sweep - 1]), _pose(where.track[sweep]), rig)
-        if view is None:
-            return False
+        view, sweep = found
         blind = self._grounding.counts.blind
         seen = self._grounding.look(view, frame)
         if self._grounding.counts.blind == blind:
@@ -142,7 +113,3 @@ class _Searched:
         self._grid.weigh(self._where.points(middles, np.array(self._sweeps)[last]), log_odds.astype(np.float64))
         evidence.save(folder / EVIDENCE)
         self._grid.save(folder / SEARCHED)
-
-
-def _pose(record: np.void) -> Pose:
-    return Pose(int(record["stamp_ns"]), record["rotation"], record["position_m"])

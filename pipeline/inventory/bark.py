@@ -3,7 +3,9 @@
 Circles through the points of a stem are too wide: a beam strays sideways by centimetres at ten metres, as much as the
 radius of a sapling; and of a stem that was seen from one side only, a circle can trade radius for distance. Both are in
 the likelihood of `bark_kernels.score`: how wide the stem looks across the beams counts, less what the beam itself is
-wide. Maximised by scoring (Berndt, Hall, Hall and Hausman 1974).
+wide, and more for what is lost at its edges. Where a beam is partly beside the stem, the sensor tags many returns as
+glued to what is behind, and these are not in the map: left out of account, stems at 12 m come out 0.9 cm too thin.
+Maximised by scoring (Berndt, Hall, Hall and Hausman 1974).
 """
 
 from __future__ import annotations
@@ -34,10 +36,11 @@ FIRST = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, slots=True)
 class Bark:
-    """radius_m at breast height, if the slice were there; sigma_m of it; strays: share of points of something else."""
+    """radius_m at the slice; sigma_m of it; blur_m: of the map there; strays: share of points of something else."""
 
     radius_m: float
     sigma_m: float
+    blur_m: float
     strays: float
 
 
@@ -51,7 +54,13 @@ def fit_bark(
     some = np.linspace(0, len(xyh) - 1, min(len(xyh), MOST_POINTS)).astype(int)
     seen = np.column_stack([xyh[some, :2], bearing[some], xyh[some, 2]])
     away = range_m[some]
-    sigmas = np.column_stack([scanner.beam_rad * away, scanner.range_sigma_m + scanner.range_growth * away])
+    beams = np.column_stack(
+        [
+            scanner.beam_rad * away,
+            scanner.range_sigma_m + scanner.range_growth * away,
+            scanner.rim_m + scanner.rim_growth * away,
+        ]
+    )
     area = np.pi * (radius_m + AROUND_M) ** 2
     expected = np.array([0.0, 0.0, radius_m, BLUR_M, taper])
     believed = np.array([0.0, 0.0, 0.0, BLUR_SIGMA_M**-2, TAPER_SIGMA**-2])
@@ -59,7 +68,7 @@ def fit_bark(
     best, damping, stray = -np.inf, 1.0, STRAY
     information = np.eye(5)
     for _ in range(ROUNDS):
-        value, gradient, outer, strays = kernels.score(seen, sigmas, state, stray, area)
+        value, gradient, outer, strays = kernels.score(seen, beams, scanner.rim_loss, state, stray, area)
         value -= 0.5 * float((believed * (state - expected) ** 2).sum())
         if value < best - 1e-9:  # too far: half of the way
             damping *= 0.5
@@ -78,4 +87,4 @@ def fit_bark(
     variance = float(np.linalg.inv(information)[RADIUS, RADIUS])
     if not 0.0 < variance < 1.0:
         return None
-    return Bark(float(found[RADIUS]), float(np.sqrt(variance)), float(stray))
+    return Bark(float(found[RADIUS]), float(np.sqrt(variance)), float(found[BLUR]), float(stray))

@@ -18,6 +18,11 @@ class Scanner(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Metres of range sigma a metre of range."""
     beam_rad: NotNegative = 0.0018
     """Sigma across the beam, a radian: pointing noise and half the divergence. It is what inflates small stems."""
+    rim_m: Positive = 0.003
+    rim_growth: NotNegative = 0.0026
+    """From the edge of a stem inwards, a beam is partly beside it: so wide, and as much more a metre of range."""
+    rim_loss: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.4
+    """Share of the returns there that the sensor tags as glued to what is behind, and that our maps leave out."""
 
 
 class InventoryConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

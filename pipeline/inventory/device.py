@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.inventory.errors import InventoryError
+from pipeline.inventory.field_list import FieldTree
 from pipeline.inventory.trees import ListedTree
 
 Doubles = npt.NDArray[np.float64]
@@ -30,43 +29,9 @@ class DeviceBias(msgspec.Struct, frozen=True):
     spread_m: float
 
 
-class MarkedTree(msgspec.Struct, frozen=True):
-    """A line of a field list, in the coordinates of the map."""
-
-    x_m: float
-    y_m: float
-    dbh_m: float
-    tag: str = ""
-
-
-def read_field_list(path: Path) -> list[MarkedTree]:
-    """A CSV with the columns x, y, dbh_cm and perhaps tag. InventoryError names file, line and what was expected."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.DictReader(line for line in file if line.strip() and not line.startswith("#"))
-            names = set(rows.fieldnames or ())
-            if not {"x", "y", "dbh_cm"} <= names:
-                raise InventoryError(
-                    f"{path}: found the columns {', '.join(sorted(names)) or 'none'}; expected x, y, dbh_cm, and tag"
-                )
-            found = []
-            for row in rows:
-                dbh = float(row["dbh_cm"])
-                if not 1.0 <= dbh <= 500.0:
-                    raise InventoryError(f"{path}:{rows.line_num}: a diameter of {dbh:g} cm; they are in centimetres")
-                tag = row.get("tag") or ""
-                found.append(MarkedTree(float(row["x"]), float(row["y"]), dbh / 100.0, tag))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InventoryError(f"{path}: cannot be read ({error})") from error
-    except (ValueError, TypeError) as error:
-        raise InventoryError(f"{path}:{rows.line_num}: x, y and dbh_cm are numbers ({error})") from error
-    if not found:
-        raise InventoryError(f"{path}: has no trees")
-    return found
-
-
-def fit_device_bias(trees: Sequence[ListedTree], marked: Sequence[MarkedTree]) -> DeviceBias:
-    """From measured trees that stand where marked ones do. InventoryError where none does."""
+def fit_device_bias(trees: Sequence[ListedTree], marked: Sequence[FieldTree]) -> DeviceBias:
+    """From measured trees that stand where marked ones do, in the coordinates of the map. InventoryError where none
+    does."""
     bases = np.array([tree.position_m[:2] for tree in trees]).reshape(-1, 2)
     errors, sigmas = [], []
     for one in marked:

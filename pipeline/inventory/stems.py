@@ -24,6 +24,8 @@ BEAM_SHARE = 0.7
 """Of the points of a stem, so much of the blur across the beam is across the bark."""
 THICK, CLEAR = 0.92, 0.75
 """Points that fill the tolerance are leaves, unless most of what is around lies on the bark."""
+SURELY_THICK = 1.65
+"""Of the spread that the range explains: leaves, whatever lies around. Stems from 10 cm have 0.6 to 1.45."""
 TRIES = 100
 REACH_M = 0.6
 """Around a candidate: a stem's near side lies within it."""
@@ -61,7 +63,7 @@ def find_stems(points: Layered, voxel_m: float, config: InventoryConfig) -> list
     for stem in fitted:
         if all(not _same(stem, other) for other in kept):
             kept.append(stem)
-    return [stem if stem.reason else _judged_again(measure(stem, points, config), config) for stem in kept]
+    return [stem if stem.reason else _judged_again(measure(stem, points, config), voxel_m, config) for stem in kept]
 
 
 def tolerance(points: Layered, place: Doubles, voxel_m: float, scanner: Scanner) -> float:
@@ -71,10 +73,15 @@ def tolerance(points: Layered, place: Doubles, voxel_m: float, scanner: Scanner)
     away = away[np.isfinite(away)]
     if not len(away):
         return max(TOLERANCE_M, float(np.hypot(0.02, voxel_m / 2.0)))
-    range_m = float(np.median(away))
-    along = scanner.range_sigma_m + scanner.range_growth * range_m
-    spread = np.sqrt(BLUR_M**2 + along**2 + (BEAM_SHARE * scanner.beam_rad * range_m) ** 2 + voxel_m**2 / 12.0)
+    spread = _spread(float(np.median(away)), voxel_m, scanner)
     return float(np.clip(SIGMAS * spread, LEAST_TOLERANCE_M, MOST_TOLERANCE_M))
+
+
+def _spread(range_m: float, voxel_m: float, scanner: Scanner) -> float:
+    """Sigma of points about smooth bark."""
+    along = scanner.range_sigma_m + scanner.range_growth * range_m
+    across = BEAM_SHARE * scanner.beam_rad * range_m
+    return float(np.sqrt(BLUR_M**2 + along**2 + across**2 + voxel_m**2 / 12.0))
 
 
 def fit(points: Layered, place: Doubles, voxel_m: float, config: InventoryConfig) -> Stem | None:
@@ -226,11 +233,13 @@ def _reason(stem: Stem, inside: int, tolerance_m: float, config: InventoryConfig
     return "; ".join(words for wrong, words in checks if wrong)
 
 
-def _judged_again(stem: Stem, config: InventoryConfig) -> Stem:
-    """After the measurement: what seemed thick enough may not be."""
-    if config.least_dbh_m <= stem.dbh_m <= config.most_dbh_m:
-        return stem
-    return replace(stem, reason=f"diameter {100 * stem.dbh_m:.0f} cm")
+def _judged_again(stem: Stem, voxel_m: float, config: InventoryConfig) -> Stem:
+    """After the measurement, which tells the diameter and the range better than the fit did."""
+    if np.isfinite(stem.range_m) and stem.sigma_m > SURELY_THICK * _spread(stem.range_m, voxel_m, config.scanner):
+        return replace(stem, reason=f"as thick as leaves: no bark at {stem.range_m:.0f} m")
+    if not config.least_dbh_m <= stem.dbh_m <= config.most_dbh_m:
+        return replace(stem, reason=f"diameter {100 * stem.dbh_m:.0f} cm")
+    return stem
 
 
 def _same(one: Stem, other: Stem) -> bool:

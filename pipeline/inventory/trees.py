@@ -34,7 +34,8 @@ class ListedTree:
     """position_m: (3,) base, in the coordinates of the map. stem: None for one that an analyst added.
 
     status: `unverified`, `confirmed` or `added`. species, probability, views, hits: of the detector, empty and NaN
-    where none looked or no detection was near. height_m, crown_m: NaN where not seen.
+    where none looked or no detection was near; or species of a field list. field_dbh_m: as taped, of such a list.
+    height_m, crown_m: NaN where not seen.
     """
 
     tree_id: int
@@ -51,6 +52,7 @@ class ListedTree:
     hits: int = 0
     tag: str = ""
     note: str = ""
+    field_dbh_m: float = np.nan
 
 
 @dataclass(frozen=True, slots=True)

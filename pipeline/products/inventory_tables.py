@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pyproj
 import shapely
 
+from pipeline.inventory.tagged import Unmatched
 from pipeline.inventory.trees import ListedTree, RejectedTree, TreeList
 from pipeline.products.occurrences import Columns, text
 from pipeline.products.tables import write_csv
@@ -51,6 +52,7 @@ def tree_columns(trees: Sequence[ListedTree]) -> Columns:
         "n_views": np.array([tree.views for tree in trees], np.int32),
         "n_hits": np.array([tree.hits for tree in trees], np.int32),
         "tag": text([tree.tag for tree in trees]),
+        "field_dbh_cm": figures([100 * tree.field_dbh_m for tree in trees], 1),
         "note": text([tree.note for tree in trees]),
     }
 
@@ -66,6 +68,19 @@ def rejected_columns(rejected: Sequence[RejectedTree]) -> Columns:
     }
 
 
+def unmatched_columns(unmatched: Sequence[Unmatched]) -> Columns:
+    """One row a listed tree without a stem."""
+    places = np.array([one.position_m for one in unmatched]).reshape(-1, 2).round(3)
+    return {
+        "tag": text([one.tree.tag for one in unmatched]),
+        "x": places[:, 0],
+        "y": places[:, 1],
+        "dbh_cm": np.round(np.array([100 * one.tree.dbh_m for one in unmatched], np.float64), 1),
+        "species": text([one.tree.species for one in unmatched]),
+        "why": text([one.why for one in unmatched]),
+    }
+
+
 def write_trees_csv(path: Path, given: TreeList) -> None:
     """Header and all, also of no trees."""
     write_csv(path, tree_columns(given.trees))
@@ -74,6 +89,11 @@ def write_trees_csv(path: Path, given: TreeList) -> None:
 def write_rejected_csv(path: Path, given: TreeList) -> None:
     """What looked like a stem, and why it is none."""
     write_csv(path, rejected_columns(given.rejected))
+
+
+def write_unmatched_csv(path: Path, unmatched: Sequence[Unmatched]) -> None:
+    """Listed trees that no stem was found for, and why."""
+    write_csv(path, unmatched_columns(unmatched))
 
 
 def write_trees_gpkg(path: Path, given: TreeList, crs: pyproj.CRS | None) -> None:

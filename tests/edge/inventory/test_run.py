@@ -11,7 +11,10 @@ from edge.cli import exit_codes
 from edge.cli.main import main
 from tests.pipeline.inventory.plots import PlotMap, Trunk
 
-TRUNKS = [Trunk(-6, 5, 0.31), Trunk(0, 8, 0.22), Trunk(5, 4, 0.14), Trunk(9, -7, 0.40)]
+TRUNKS = [
+    *(Trunk(-6, 5, 0.31), Trunk(0, 8, 0.22), Trunk(5, 4, 0.14)),
+    *(Trunk(9, -7, 0.40), Trunk(-3, -9, 0.18), Trunk(-9, -4, 0.26)),
+]
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +74,7 @@ def test_diameters_are_evaluated_and_the_device_bias_is_fitted(plot, tmp_path, c
     asked = ["evaluate", "diameters", str(folder), "--truth", str(field), "--page", str(page), "--json"]
     assert main(asked) == exit_codes.GOOD
     told = json.loads(capsys.readouterr().out)
-    assert (told["found"], told["made_up"], told["completeness"]) == (4, 0, 1.0)
+    assert (told["found"], told["made_up"], told["completeness"]) == (len(TRUNKS), 0, 1.0)
     assert abs(told["bias_m"]) < 0.006
     assert page.stat().st_size > 1000
 
@@ -91,3 +94,29 @@ def test_what_is_no_map_is_told(tmp_path, capsys):
     (tmp_path / "a.laz").write_bytes(b"nonsense")
     assert main(["inventory", str(tmp_path / "a.laz")]) == exit_codes.FAILED
     assert "a.laz" in capsys.readouterr().err
+
+
+def test_a_field_list_by_compass_and_tape_numbers_the_trees(plot, tmp_path, capsys):
+    field = tmp_path / "field.csv"
+    rows = []
+    for number, trunk in enumerate(TRUNKS, start=7):
+        away, bearing = np.hypot(trunk.x, trunk.y), np.degrees(np.arctan2(trunk.x, trunk.y)) + 33.0
+        rows.append(f"{number},{away:.2f},{bearing % 360:.1f},{100 * trunk.dbh:.1f}\n")
+    field.write_text("tag,distance_m,azimuth_deg,dbh_cm\n" + "".join(rows) + "99,11,0,24\n")
+    folder = tmp_path / "out"
+    asked = ["inventory", str(plot), "--output", str(folder), "--field-list", str(field), "--no-laz", "--json"]
+    assert main(asked) == exit_codes.GOOD
+    told = json.loads(capsys.readouterr().out)["field_list"]
+    assert (told["listed"], told["matched"]) == (len(TRUNKS) + 1, len(TRUNKS))
+    with (folder / "trees.csv").open() as file:
+        trees = {row["tag"]: row for row in csv.DictReader(file)}
+    for number, trunk in enumerate(TRUNKS, start=7):
+        assert float(trees[str(number)]["x"]) == pytest.approx(450_020 + trunk.x, abs=0.1)
+        assert float(trees[str(number)]["field_dbh_cm"]) == pytest.approx(100 * trunk.dbh, abs=0.1)
+    with (folder / "field_unmatched.csv").open() as file:
+        assert [(row["tag"], row["why"]) for row in csv.DictReader(file)] == [("99", "no stem was found there")]
+
+
+def test_april_tags_of_a_map_without_video_are_refused_at_once(plot, tmp_path, capsys):
+    assert main(["inventory", str(plot), "--april-tags", "--output", str(tmp_path / "out")]) == exit_codes.FAILED
+    assert "in the video of a session" in capsys.readouterr().err

@@ -21,7 +21,8 @@ class Trunk:
     height: float = 12.0
 
     def points(self, random, count, sensors, noise):
-        """As beams see it: even across, from each of the sensors in turn; strays sideways and along the beam."""
+        """As beams see it: even across, from each of the sensors in turn; sideways and along the beam it is noisy, and
+        where a beam is partly beside the trunk, a share of the returns is not in the map."""
         h = random.uniform(0.2, 7.0, count)
         axis = np.array([self.x, self.y]) + np.outer(h, self.lean)
         radius = 0.5 * (self.dbh + self.taper * (h - 1.3))
@@ -31,16 +32,19 @@ class Trunk:
         beam /= away
         across = np.column_stack([-beam[:, 1], beam[:, 0]])
         y = random.uniform(-1, 1, count) * radius
+        spoilt = (radius - np.abs(y) < RIM[0] + RIM[1] * away[:, 0]) & (random.random(count) < RIM[2])
         depth = -np.sqrt(radius**2 - y**2)
         y = y + noise[0] * away[:, 0] * random.standard_normal(count)
         depth = depth + noise[1] * random.standard_normal(count)
-        return np.column_stack([axis + across * y[:, None] + beam * depth[:, None], h]), stood
+        return np.column_stack([axis + across * y[:, None] + beam * depth[:, None], h])[~spoilt], stood[~spoilt]
 
 
 def slope(xy):
     return 0.25 * xy[:, 0] - 0.1 * xy[:, 1]
 
 
+RIM = (0.003, 0.0026, 0.4)
+"""Width at no range, its growth a metre, share lost: of a scanner whose glued points are left out."""
 NOISE = (0.0018, 0.011)
 """Radians across the beam, metres along it: of the scanner that the configuration assumes, without a blur."""
 

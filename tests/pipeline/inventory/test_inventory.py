@@ -4,12 +4,13 @@ from scipy.integrate import trapezoid
 from scipy.optimize import least_squares
 
 from pipeline.inventory import bark_kernels, circle_kernels
+from pipeline.inventory.bark import fit_bark
 from pipeline.inventory.candidates import Layered
-from pipeline.inventory.config import InventoryConfig
+from pipeline.inventory.config import InventoryConfig, Scanner
 from pipeline.inventory.inventory import take_inventory
 from pipeline.inventory.stems import find_stems
 from pipeline.inventory.terrain import TerrainBuilder
-from tests.pipeline.inventory.plots import PlotMap, Trunk, block, slope
+from tests.pipeline.inventory.plots import RIM, PlotMap, Trunk, block, slope
 
 TRUNKS = [
     Trunk(-6, 5, 0.31, (0.03, -0.02)),
@@ -40,6 +41,23 @@ def test_what_the_beam_adds_to_a_sapling_is_taken_off():
     (stem,) = [s for s in find_stems(points, 0.0, CONFIG) if not s.reason]
     assert stem.fitted_dbh_m > 1.1 * far.dbh
     assert abs(stem.dbh_m - far.dbh) < 0.07 * far.dbh
+
+
+def test_what_is_lost_at_the_edges_of_far_stems_is_made_up_for():
+    sensors, trunk = np.array([[x, 0.0] for x in np.arange(-6.0, 6.1, 2.0)]), Trunk(0, 12, 0.2, taper=0.0)
+    error = {0.0: [], RIM[2]: []}
+    for seed in range(8):
+        xyh, stood = trunk.points(np.random.default_rng(seed), 800, sensors, (0.002, 0.016))
+        beam = (trunk.x, trunk.y) - stood
+        away = np.linalg.norm(beam, axis=1)
+        xyh -= (trunk.x, trunk.y, 1.3)
+        for loss, errors in error.items():
+            scanner = Scanner(rim_loss=loss)
+            errors.append(
+                fit_bark(xyh, beam / away[:, None], away, radius_m=0.12, taper=0.0, scanner=scanner).radius_m - 0.1
+            )
+    assert abs(np.mean(error[RIM[2]])) < 0.002
+    assert np.mean(error[0.0]) < -0.004
 
 
 def test_without_the_place_of_the_scanner_there_are_diameters_too():
@@ -93,10 +111,10 @@ def test_the_likelihood_is_the_integral_that_it_says_and_its_gradient_the_deriva
     seen = np.column_stack(
         [random.normal(0, 0.1, (count, 2)), np.cos(turn), np.sin(turn), random.uniform(-1, 2, count)]
     )
-    sigmas = np.tile([0.015, 0.01], (count, 1))
+    beams = np.tile([0.015, 0.01, 0.03], (count, 1))
     state = np.array([0.01, -0.02, 0.12, 0.012, -0.05])
-    value, gradient, _, _ = bark_kernels.score(seen, sigmas, state, 0.05, 0.2)
-    across, along = np.hypot(sigmas.T, state[3])
+    value, gradient, _, _ = bark_kernels.score(seen, beams, 0.4, state, 0.05, 0.2)
+    across, along = np.hypot(beams[:, :2].T, state[3])
     y = np.linspace(-1, 1, 4001)
     total = 0.0
     for n in range(count):
@@ -104,11 +122,12 @@ def test_the_likelihood_is_the_integral_that_it_says_and_its_gradient_the_deriva
         u, v = -seen[n, 3] * away[0] + seen[n, 2] * away[1], seen[n, 2:4] @ away
         r = state[2] * (1 + state[4] * seen[n, 4])
         near = np.exp(-0.5 * ((u - r * y) / across[n]) ** 2 - 0.5 * ((v + r * np.sqrt(1 - y * y)) / along[n]) ** 2)
-        p = 0.5 * trapezoid(near, y) / (2 * np.pi * across[n] * along[n])
+        kept = 1 - 0.4 * np.exp(-np.pi / 4 * (r * (1 - np.abs(y)) / beams[n, 2]) ** 2)
+        p = trapezoid(kept * near, y) / trapezoid(kept, y) / (2 * np.pi * across[n] * along[n])
         total += np.log(0.95 * p + 0.05 / 0.2)
     assert value == pytest.approx(total, rel=0.02)
     for k in range(5):
         step = np.zeros(5)
         step[k] = 1e-5
-        ahead, behind = (bark_kernels.score(seen, sigmas, state + s, 0.05, 0.2)[0] for s in (step, -step))
+        ahead, behind = (bark_kernels.score(seen, beams, 0.4, state + s, 0.05, 0.2)[0] for s in (step, -step))
         assert gradient[k] == pytest.approx((ahead - behind) / 2e-5, rel=0.03, abs=2.0)
