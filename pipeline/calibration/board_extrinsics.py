@@ -3,7 +3,9 @@
 In each pose the camera knows the board's plane from its corners, and the LiDAR from its points (centre c, axes e1 e2,
 spread s1 s2). With the plane n . x = d of the camera the three residuals, all in metres, are
 n . (R c + t) - d,   s1 n . R e1,   s2 n . R e2.
-Their scatter over all poses gives the uncertainty. Three planes of different directions determine everything.
+Each pose counts by what its corners and points leave open: corners tell the tilt of a board that is far off, or
+that faces the camera, several times worse than that of a near and tilted one. The scatter over all poses gives the
+uncertainty. Three planes of different directions determine everything.
 """
 
 from __future__ import annotations
@@ -27,6 +29,10 @@ LEAST_POSES = 5
 OUTLIER = 3.5
 """A pose whose residual is so many times the median is left out, if it is above `FINE_M`."""
 FINE_M = 0.01
+FAR_SIGMAS = 3.0
+"""Of a residual, from where on it counts less."""
+LEAST_PX, LEAST_M = 0.05, 0.001
+"""Corners and the middle of a board's points are not better than that, whatever their scatter says."""
 WORST_ROTATION_DEG = 0.5
 WORST_TRANSLATION_M = 0.03
 WORST_RESIDUAL_M = 0.02
@@ -64,17 +70,23 @@ class BoardFound(Found):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """A hold with the board's pose in the optical frame; None where the camera cannot tell it."""
+    """A hold with the board's pose in the optical frame; None where the camera cannot tell it.
+
+    covariance: (6, 6) of that pose, a turn about the board's origin and a shift, both in the optical frame.
+    """
 
     hold: Hold
     corners_m: Array
     pose: tuple[Array, Array] | None
+    covariance: Array
 
     @classmethod
     def of(cls, hold: Hold, board: Board, camera: CameraModel) -> _Seen:
         pose = board_pose(hold.sighting, camera)
-        turned = None if pose is None else (Rotation.from_rotvec(pose[0]).as_matrix(), pose[1])
-        return cls(hold, board.outline_m, turned)
+        if pose is None:
+            return cls(hold, board.outline_m, None, np.eye(6))
+        turned = Rotation.from_rotvec(pose[0]).as_matrix(), pose[1]
+        return cls(hold, board.outline_m, turned, _pose_covariance(hold.sighting, camera, turned))
 
     def look(self, guess: Extrinsics) -> Patch | None:
         place = self._place(guess)
@@ -94,10 +106,25 @@ class _Seen:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """normal, distance_m: of the plane in the optical frame."""
+    """normal, distance_m: of the plane in the optical frame. white: (3, 3) makes residuals of one sigma each."""
 
     seen: _Seen
     patch: Patch
+    white: Array
+
+    @classmethod
+    def of(cls, seen: _Seen, patch: Patch, near: Extrinsics) -> _Pair:
+        """near: the pose, as far as it is known."""
+        assert seen.pose is not None
+        normal = seen.pose[0][:, 2]
+        arm_m = near.rotation @ patch.centre_m + near.translation_m - seen.pose[1]
+        axes = patch.spread_m[:, None] * (patch.axes @ near.rotation.T)
+        by_pose = np.zeros((3, 6))
+        by_pose[0] = [*np.cross(normal, arm_m), *-normal]
+        by_pose[1:, :3] = np.cross(normal, axes)
+        of_points = patch.thickness_m**2 / patch.points + LEAST_M**2
+        covariance = by_pose @ seen.covariance @ by_pose.T + of_points * np.eye(3)
+        return cls(seen, patch, np.linalg.inv(np.linalg.cholesky(covariance)))
 
     @property
     def name(self) -> str:
@@ -117,7 +144,7 @@ class _Pair:
 def from_board(holds: Sequence[Hold], board: Board, camera: CameraModel, guess: Extrinsics) -> BoardFound:
     """guess: measured by hand, a few degrees and centimetres off. CalibrationError when hardly a pose can be used."""
     seen = [_Seen.of(hold, board, camera) for hold in holds]
-    pairs = [_Pair(one, patch) for one in seen if (patch := one.look(guess)) is not None]
+    pairs = [_Pair.of(one, patch, guess) for one in seen if (patch := one.look(guess)) is not None]
     if len(pairs) < LEAST_POSES:
         raise CalibrationError(
             f"the board can be used in {len(pairs)} of {len(holds)} poses, and {LEAST_POSES} are needed: the LiDAR "
@@ -127,7 +154,7 @@ def from_board(holds: Sequence[Hold], board: Board, camera: CameraModel, guess: 
     found = _agreed(pairs, guess)[0]
     for _ in range(2):
         # Near enough now to cut the board out.
-        pairs = [_Pair(pair.seen, pair.seen.cut(found) or pair.patch) for pair in pairs]
+        pairs = [_Pair.of(pair.seen, pair.seen.cut(found) or pair.patch, found) for pair in pairs]
         found, used = _agreed(pairs, found)
     return _judged(found, used, pairs, seen)
 
@@ -146,6 +173,19 @@ def _agreed(pairs: list[_Pair], start: Extrinsics) -> tuple[Extrinsics, list[_Pa
     return found, used
 
 
+def _pose_covariance(sighting: Sighting, camera: CameraModel, pose: tuple[Array, Array]) -> Array:
+    """(6, 6): what the corners' scatter about the board leaves open."""
+    on_board = sighting.board_m @ pose[0].T
+
+    def pixels(step: Array) -> Array:
+        return camera.project(Rotation.from_rotvec(step[:3]).apply(on_board) + pose[1] + step[3:])[0].ravel()
+
+    columns = [(pixels(1e-5 * axis) - pixels(-1e-5 * axis)) / 2e-5 for axis in np.eye(6)]
+    jacobian, left = np.stack(columns, axis=1), sighting.pixels.ravel() - pixels(np.zeros(6))
+    variance = max(float(left @ left) / max(len(left) - 6, 1), LEAST_PX**2)
+    return np.asarray(variance * np.linalg.pinv(jacobian.T @ jacobian))
+
+
 def _residuals(extrinsics: Extrinsics, pair: _Pair) -> Array:
     across = extrinsics.rotation.T @ pair.normal
     patch = pair.patch
@@ -160,33 +200,33 @@ def _size(extrinsics: Extrinsics, pair: _Pair) -> float:
 def _stacked(pairs: Sequence[_Pair], start: Extrinsics) -> Callable[[Array], Array]:
     def stacked(step: Array) -> Array:
         moved = start.moved(step)
-        return np.concatenate([_residuals(moved, pair) for pair in pairs])
+        return np.concatenate([pair.white @ _residuals(moved, pair) for pair in pairs])
 
     return stacked
 
 
 def _solve(pairs: Sequence[_Pair], start: Extrinsics) -> Extrinsics:
-    solution = least_squares(_stacked(pairs, start), np.zeros(6), loss="soft_l1", f_scale=0.01, x_scale=_SCALE)
+    solution = least_squares(_stacked(pairs, start), np.zeros(6), loss="soft_l1", f_scale=FAR_SIGMAS, x_scale=_SCALE)
     return start.moved(solution.x)
 
 
 _SCALE = np.array([0.01] * 3 + [0.01] * 3)
 
 
-def _covariance(pairs: Sequence[_Pair], found: Extrinsics) -> tuple[Array, float]:
-    """And the RMS residual. Huge where the poses leave a direction open."""
+def _covariance(pairs: Sequence[_Pair], found: Extrinsics) -> Array:
+    """Huge where the poses leave a direction open."""
     stacked, step = _stacked(pairs, found), 1e-5
     columns = [(stacked(step * axis) - stacked(-step * axis)) / (2.0 * step) for axis in np.eye(6)]
     jacobian, left = np.stack(columns, axis=1), stacked(np.zeros(6))
     normal = jacobian.T @ jacobian
     variance = float(left @ left) / max(len(left) - 6, 1)
-    residual = float(np.sqrt(np.mean(left**2)))
     normal = normal + np.diag(LOOSEST**-2) * variance
-    return np.asarray(variance * np.linalg.inv(normal) + np.diag(FLOOR**2), np.float64), residual
+    return np.asarray(variance * np.linalg.inv(normal) + np.diag(FLOOR**2), np.float64)
 
 
 def _judged(found: Extrinsics, used: Sequence[_Pair], pairs: Sequence[_Pair], seen: Sequence[_Seen]) -> BoardFound:
-    covariance, residual = _covariance(used, found)
+    covariance = _covariance(used, found)
+    residual = float(np.sqrt(np.mean([_size(found, pair) ** 2 for pair in used])))
     reports = [_report(one, found, pairs, used) for one in seen]
     result = BoardFound(found, covariance, residual_m=residual, holds=tuple(reports))
     return replace(result, refusal=_refusal(result, used))
