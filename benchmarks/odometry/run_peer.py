@@ -32,7 +32,7 @@ def main() -> None:
     table = np.array(rows, dtype=np.float64).reshape(-1, 5)
     # Not `getrusage`: that remembers the parent's size from before the exec.
     peak_mb = int(Path("/proc/self/status").read_text(encoding="ascii").split("VmHWM:")[1].split()[0]) / 1024.0
-    peak_mb -= sum(array.nbytes for array in data.values()) / 1e6  # its input, which a payload would not hold
+    peak_mb -= sum(array.nbytes for array in data.values()) / 2**20  # its input, which a payload would not hold
     np.savez(target, stamps_s=table[:, 0], position=table[:, 1:4], ms=table[:, 4], peak_mb=peak_mb, failed=failed)
 
 
