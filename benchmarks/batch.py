@@ -1,6 +1,6 @@
 """Eight short sessions one by one, by two workers, and by two workers with a broken session and a killed worker.
 
-    python -m benchmarks.batch --cache DIR [make] [serial] [batch] [faults] [table]
+    python -m benchmarks.batch [make] [serial] [batch] [faults] [table] --cache DIR [--seeds 1 2 3 4 5 6 7 8]
 
 Each part alone, or all in turn; what a part measured is kept in DIR. Sessions are the beginnings of simulated walks:
 LiDAR, IMU, GNSS. `serial` takes one after the other in one process, so that it pays for loading and compiling once.
@@ -37,10 +37,9 @@ from edge.batch.work import work
 from edge.config import Config
 from edge.process.watch import Watch
 
-SESSIONS, WORKERS, LENGTH_S = 8, 2, 15.0
-BROKEN = "walk_3"
-KILL_AT = "walk_5: process begins"
-"""When this line is seen, the worker that said it is killed a moment later."""
+WORKERS, LENGTH_S = 2, 15.0
+BROKEN, KILLED = 2, 3
+"""Which of the sessions is rubbish; which one has begun when a worker is killed a moment later."""
 TIMED = {"odometry_seconds"}
 PARTS = ("make", "serial", "batch", "faults", "table")
 
@@ -48,15 +47,20 @@ PARTS = ("make", "serial", "batch", "faults", "table")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cache", type=Path, required=True, help="where sessions and products are kept")
+    parser.add_argument("--seeds", type=int, nargs="+", default=list(range(1, 9)), help="of the walks; four at least")
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; all in turn where none is named")
     options = parser.parse_args()
+    cache, names = options.cache, [f"walk_{seed}" for seed in options.seeds]
     for part in options.parts or PARTS:
-        {"make": make, "serial": serial, "batch": batch, "faults": faults, "table": table}[part](options.cache)
+        if part == "make":
+            make(cache, options.seeds)
+        else:
+            {"serial": serial, "batch": batch, "faults": faults, "table": table}[part](cache, names)
 
 
-def make(cache: Path) -> None:
+def make(cache: Path, seeds: list[int]) -> None:
     """The sessions, once for each run: hard links of the same files."""
-    for seed in range(1, SESSIONS + 1):
+    for seed in seeds:
         path = cache / "recordings" / f"walk_{seed}" / f"walk_{seed}_0.mcap"
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -66,7 +70,7 @@ def make(cache: Path) -> None:
             other.parent.mkdir(parents=True, exist_ok=True)
             if not other.exists():
                 os.link(path, other)
-    broken = cache / "faults" / BROKEN / f"{BROKEN}_0.mcap"
+    broken = next((cache / "faults" / f"walk_{seeds[BROKEN]}").glob("*.mcap"))
     broken.unlink()
     broken.write_bytes(b"rubbish" * 1000)
 
@@ -83,32 +87,33 @@ def _messages(seed: int, cache: Path) -> Iterator[Message]:
     return heapq.merge(cast.imu(), cast.scans(), fixes, key=lambda message: message.receive_ns)
 
 
-def serial(cache: Path) -> None:
+def serial(cache: Path, names: list[str]) -> None:
     """In this process; broken off, it goes on with the next session."""
     noted, begun_s, cpu_s = cache / "serial.json", time.monotonic(), time.process_time()
     before = json.loads(noted.read_text()) if noted.exists() else {"took_s": 0.0, "cpu_s": 0.0, "sessions": []}
-    for session in sorted((cache / "serial").iterdir()):
-        if session.name not in before["sessions"]:
-            for step in plan(session, refine=True):
+    for name in names:
+        if name not in before["sessions"]:
+            for step in plan(cache / "serial" / name, refine=True):
                 work(step, Config(), Watch())
-            before["sessions"].append(session.name)
+            before["sessions"].append(name)
             took = {"took_s": time.monotonic() - begun_s, "cpu_s": time.process_time() - cpu_s}
-            _note(cache, "serial", before | {name: before[name] + seconds for name, seconds in took.items()})
+            _note(cache, "serial", before | {what: before[what] + seconds for what, seconds in took.items()})
 
 
-def batch(cache: Path) -> None:
+def batch(cache: Path, _names: list[str]) -> None:
     """Undisturbed."""
-    _note(cache, "batch", _run(cache / "batch", kill=False))
+    _note(cache, "batch", _run(cache / "batch"))
 
 
-def faults(cache: Path) -> None:
+def faults(cache: Path, names: list[str]) -> None:
     """Disturbed, then once more: what is done must be found done."""
-    told = _run(cache / "faults", kill=True)
-    told["again"] = _run(cache / "faults", kill=False)
+    told = _run(cache / "faults", f"{names[KILLED]}: process begins")
+    told["again"] = _run(cache / "faults")
     _note(cache, "faults", told)
 
 
-def _run(directory: Path, *, kill: bool) -> dict[str, Any]:
+def _run(directory: Path, kill_at: str = "") -> dict[str, Any]:
+    """kill_at: when this line is seen, a worker is killed a moment later."""
     command = [sys.executable, "-m", "edge.cli.main", "batch", str(directory), "--workers", str(WORKERS), "--json"]
     begun_s = time.monotonic()
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -118,7 +123,7 @@ def _run(directory: Path, *, kill: bool) -> dict[str, Any]:
     for line in running.stderr:
         lines.append(line.rstrip())
         print(lines[-1], flush=True)
-        if kill and not killed and line.startswith(KILL_AT):
+        if kill_at and not killed and line.startswith(kill_at):
             time.sleep(2.0)
             killed = _worker(running.pid)
             os.kill(killed, signal.SIGKILL)
@@ -134,7 +139,7 @@ def _worker(parent: int) -> int:
     return max(map(int, children), key=lambda pid: int(Path(f"/proc/{pid}/statm").read_text().split()[1]))
 
 
-def table(cache: Path) -> None:
+def table(cache: Path, names: list[str]) -> None:
     """What was measured."""
     one, two, three = (json.loads((cache / f"{name}.json").read_text()) for name in ("serial", "batch", "faults"))
     print(f"one by one: {one['took_s']:.0f} s, of them {one['cpu_s']:.0f} s of processor time")
@@ -148,14 +153,16 @@ def table(cache: Path) -> None:
     redone = sum(bool(done["redone"]) for outcome in again["outcomes"] for done in outcome["done"].values())
     print(f"once more: {again['took_s']:.0f} s, {redone} stages done again")
     for run in ("batch", "faults"):
-        same, other = _compare(cache / "serial", cache / run)
+        broken = names[BROKEN] if run == "faults" else ""
+        same, other = _compare(cache / "serial", cache / run, broken)
         print(f"{run}: {same} files are those of one by one, {len(other)} are not: {', '.join(other) or '-'}")
 
 
-def _compare(left: Path, right: Path) -> tuple[int, list[str]]:
+def _compare(left: Path, right: Path, broken: str) -> tuple[int, list[str]]:
+    """broken: a session that has no products on the right."""
     first, second = _digests(left), _digests(right)
-    if BROKEN in {path.name for path in right.iterdir() if not (path / "products" / "products.json").exists()}:
-        first = {name: digest for name, digest in first.items() if not name.startswith(BROKEN)}
+    if broken:
+        first = {name: digest for name, digest in first.items() if not name.startswith(f"{broken}/")}
     names = sorted(first.keys() | second.keys())
     other = [name for name in names if first.get(name) != second.get(name)]
     return len(names) - len(other), other

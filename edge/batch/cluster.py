@@ -28,6 +28,8 @@ _SETTINGS = {
     "distributed.worker.memory.target": False,  # results are small: there is nothing to spill
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,  # a paused worker that frees nothing waits for ever
+    "distributed.worker.profile.enabled": False,  # it looks at our threads a hundred times a second
+    "distributed.nanny.pre-spawn-environ": {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # no trimmed heap
     "distributed.comm.timeouts.connect": "30s",
 }
 
