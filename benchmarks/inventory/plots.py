@@ -54,14 +54,15 @@ class Plot:
 
 
 class BesideWay:
-    """A plot's map as far as `REACH_M` from the way."""
+    """A plot's map as far as `REACH_M` from the way, in memory."""
 
     def __init__(self, one: Plot, voxel_m: float) -> None:
         way_m = read_track(one.folder / TRACK)["position_m"]
-        self._map = TileMap(one.folder / TILES, voxel_m, way_m, None)
-        self._way = cKDTree(way_m[::5, :2])
-        self.name, self.count, self.origin_m, self.crs = one.folder.name, self._map.count, self._map.origin_m, None
-        self.voxel_m = voxel_m
+        way = cKDTree(way_m[::5, :2])
+        whole = TileMap(one.folder / TILES, voxel_m, way_m, None)
+        self._parts = [_near(part, way) for part in whole.parts()]
+        self.count = sum(len(part.xyz_m) for part in self._parts)
+        self.name, self.origin_m, self.crs, self.voxel_m = one.folder.name, whole.origin_m, None, voxel_m
         self.bounds_m = np.array([way_m[:, :2].min(axis=0) - REACH_M, way_m[:, :2].max(axis=0) + REACH_M])
 
     def placed(self, xyz_m: Array) -> Array:
@@ -69,12 +70,14 @@ class BesideWay:
         return xyz_m
 
     def parts(self) -> Iterator[Part]:
-        """Tile by tile, without what is far."""
-        for part in self._map.parts():
-            near = self._way.query(part.xyz_m[:, :2], distance_upper_bound=REACH_M)[0] < REACH_M
-            if near.any():
-                sensor_m = None if part.sensor_m is None else part.sensor_m[near]
-                yield Part(part.xyz_m[near], part.reflector[near], sensor_m)
+        """Tile by tile."""
+        return iter(self._parts)
+
+
+def _near(part: Part, way: cKDTree) -> Part:
+    near = way.query(part.xyz_m[:, :2], distance_upper_bound=REACH_M)[0] < REACH_M
+    sensor_m = None if part.sensor_m is None else part.sensor_m[near]
+    return Part(part.xyz_m[near], part.reflector[near], sensor_m)
 
 
 def plot(density: str, seed: int, cache: Path) -> Plot:

@@ -71,12 +71,12 @@ def _simulated(session: Path, truth: Path, measured: tuple[Array, Array, Array])
         said = read_tum(products / ("trajectory.tum" if placed else "trajectory_odom.tum")).within(true)
     except ValueError as error:
         raise FormatError(f"{products} against {truth}: {error}") from error
-    places = _beside(places, said, true.at(said.stamps_ns))
+    true = true.at(said.stamps_ns)
+    places = _beside(places, said, true)
     way = cKDTree(true.positions_m[:, :2])
     stood, true_dbh = read_true_stems(truth)
-    near = way.query(places)[0] <= WITHIN_M if len(places) else np.zeros(0, np.bool_)
-    passed = cKDTree(true.at(said.stamps_ns).positions_m[:, :2])
-    wanted = (passed.query(stood)[0] <= WITHIN_M) & (true_dbh >= LEAST_M)
+    near = way.query(places)[0] <= WITHIN_M
+    wanted = (way.query(stood)[0] <= WITHIN_M) & (true_dbh >= LEAST_M)
     return Diameters(places[near], dbh[near], sigma[near], stood, true_dbh, wanted)
 
 

@@ -10,6 +10,7 @@ from edge.errors import FormatError
 from edge.process import fusion_stage, odometry_stage, trees_file
 from edge.process.fusion_stage import read_placement
 from edge.process.trees_file import read_trees
+from pipeline.inventory.diameter import COARSE_M
 from pipeline.inventory.source import MapSource, open_map
 from pipeline.inventory.tilemap import TileMap
 from pipeline.products.tiles import tiles
@@ -60,7 +61,7 @@ def _of_stages(target: Path, products: Path, work: Path, config: Config) -> Foun
         detected = [tree for tree in trees if tree.frame == frame]
         if len(detected) < len(trees):
             notes.append(f"{len(trees) - len(detected)} detections are in another frame than the map: process again")
-    if config.products.voxel_m > 0.03:
+    if config.products.voxel_m > COARSE_M:
         notes.append(
             f"the map keeps one point in {100 * config.products.voxel_m:g} cm: diameters come out too thick; process "
             "with products.voxel_m = 0.02 to measure them"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -15,6 +16,8 @@ from pipeline.inventory.stem import BREAST_M, Slice, Stem
 Doubles = npt.NDArray[np.float64]
 LOWEST_M, HIGHEST_M, SLICE_M = 0.7, 5.5, 0.6
 LEAST_POINTS, LEAST_SLICES = 25, 3
+COARSE_M = 0.03
+"""A map of larger voxels does not tell how many beams met which part of a stem."""
 TAPER, TAPER_SIGMA = -0.06, 0.06
 """Of the radius, a metre: what stems do, saplings more than trees."""
 WITHIN_SLICE = -0.045
@@ -30,10 +33,13 @@ BLUR_SHARE = 0.25
 all its slices."""
 
 
-def measure(stem: Stem, points: Layered, config: InventoryConfig) -> Stem:
+def measure(stem: Stem, points: Layered, voxel_m: float, config: InventoryConfig) -> Stem:
     """The stem with the diameter that its scanner must have seen; where the map does not tell of the scanner, with the
-    circles' diameter less their bias."""
-    slices, range_m = _slices(stem, points, config.scanner)
+    circles' diameter less their bias. voxel_m: of the map, if it was thinned; 0 where it is not known."""
+    scanner = config.scanner
+    if voxel_m > COARSE_M:  # what is lost at the rim is not missed where each voxel keeps a point
+        scanner = msgspec.structs.replace(scanner, rim_loss=0.0)
+    slices, range_m = _slices(stem, points, scanner)
     if len(slices) < LEAST_SLICES:
         return replace(_without_scanner(stem), range_m=range_m)
     told, barks = zip(*slices, strict=True)

@@ -63,7 +63,9 @@ def find_stems(points: Layered, voxel_m: float, config: InventoryConfig) -> list
     for stem in fitted:
         if all(not _same(stem, other) for other in kept):
             kept.append(stem)
-    return [stem if stem.reason else _judged_again(measure(stem, points, config), voxel_m, config) for stem in kept]
+    return [
+        stem if stem.reason else _judged_again(measure(stem, points, voxel_m, config), voxel_m, config) for stem in kept
+    ]
 
 
 def tolerance(points: Layered, place: Doubles, voxel_m: float, scanner: Scanner) -> float:
