@@ -72,15 +72,15 @@ class Grounding:
         return NOTHING if self.evidence is None else self._mark(self.evidence, around, depth, boxes, sightings)
 
     def probable(self) -> list[Hypothesis]:
-        """Those that are more probable than not, without what takes longer to say of them."""
+        """Those that are more probable than not, view by view, without what takes longer to say of them."""
         return [one for one in self._hypotheses.pointed_at() if one.log_odds > log_odds(self.config.probable)]
 
     def trees(self) -> list[Tree]:
-        """All that were ever pointed at, the most probable first, also those that later views spoke against."""
+        """All that were ever pointed at, the most probable by all views together first, also the improbable ones."""
         name = self.config.target
         return [
             tree_of(one, number, name, self._source, self.evidence)
-            for number, one in enumerate(self._hypotheses.pointed_at(), 1)
+            for number, one in enumerate(self._hypotheses.settled(), 1)
         ]
 
     def _mark(

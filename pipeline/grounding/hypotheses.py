@@ -13,28 +13,30 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from pipeline.grounding.columns import Columns
 from pipeline.grounding.config import GroundingConfig
 from pipeline.grounding.depth import DepthImage
+from pipeline.grounding.joint import settled
 from pipeline.grounding.likelihood import hit, log_odds, miss
+from pipeline.grounding.looks import Looks
 from pipeline.grounding.sighting import Sighting
 from pipeline.grounding.stems import SIGMA_M, Stem
+from pipeline.grounding.views import CameraView
 from pipeline.trees import View
 
 Array = npt.NDArray[np.float64]
-COLUMN_M = np.arange(0.5, 4.6, 0.5)
-"""Heights above the ground at which a tree is looked for in an image."""
-LEAST_SHOWN = 0.4
-"""Share of these that must be in the image and unhidden, or the view says nothing."""
 NEVER = 1e6
 BLOCK_M = 16.0
+NEAR_SIDE_M = 0.35
+"""Without a stem the place is that of what was seen, mostly from one side."""
 
 
 @dataclass(slots=True, eq=False)
 class Hypothesis:
     """mean_m (2,), covariance (2, 2): horizontal. layers: of the stem; 0 for one that boxes alone point at.
 
-    from_m: (2,) where it was last looked at from, None at first. height_m: of the camera when it was begun.
-    ranges_m: their sum over the hits, for the mean.
+    from_m: (2,) where it was last looked at from, None at first. number: in the order of their beginning. height_m: of
+    the camera then. ranges_m: their sum over the hits, for the mean.
     """
 
     mean_m: Array
@@ -42,6 +44,7 @@ class Hypothesis:
     height_m: float
     log_odds: float
     layers: float = 0.0
+    number: int = 0
     first_ns: int = 0
     last_ns: int = 0
     views: int = 0
@@ -90,6 +93,8 @@ class Hypotheses:
     def __init__(self, config: GroundingConfig) -> None:
         self._config = config
         self._blocks: dict[tuple[int, int], list[Hypothesis]] = defaultdict(list)
+        self._looks = Looks(config)
+        self._count = 0
         self._prior, self._prior_free = log_odds(config.evidence.prior), log_odds(config.evidence.prior_free)
 
     def __iter__(self) -> Iterator[Hypothesis]:
@@ -107,18 +112,40 @@ class Hypotheses:
 
     def look(self, depth: DepthImage, sightings: list[Sighting]) -> None:
         """One view: its boxes, and what it shows without one."""
-        near = self._near(depth.view.position_m[:2], self._config.farthest_m)
+        from_m = depth.view.position_m[:2]
+        near = self._near(from_m, self._config.farthest_m)
         meant, shares = self._paired(near, sightings)
-        for sighting, one, share in zip(sightings, meant, shares, strict=True):
-            self._hit(one if one is not None else self._begin(sighting, depth), sighting, depth, share)
-        hit_ones = {id(one) for one in meant if one is not None}
-        for one in near:
-            if id(one) not in hit_ones:
-                self._missed(one, sightings, depth)
+        hit_ones = [one or self._begin(sighting, depth) for one, sighting in zip(meant, sightings, strict=True)]
+        for sighting, one, share in zip(sightings, hit_ones, shares, strict=True):
+            self._hit(one, sighting, depth, share)
+        near += [one for one, known in zip(hit_ones, meant, strict=True) if known is None]
+        if not near:
+            return
+        means, spreads = np.array([one.mean_m for one in near]), np.array([one.covariance for one in near])
+        columns = Columns.of(means, depth)
+        covered = columns.under(sightings)
+        for k in np.flatnonzero(columns.shown):
+            if not any(near[k] is one for one in hit_ones):
+                self._missed(near[k], depth.view, covered=bool(covered[k]))
+        numbers = np.array([one.number for one in near])
+        self._looks.add(numbers, means, spreads, columns=columns, sightings=sightings, from_m=from_m)
 
     def pointed_at(self) -> list[Hypothesis]:
         """Those that a box ever meant, the most probable first; what boxes alone point at joins the stem it means."""
-        hit = [replace(one, best=list(one.best)) for one in self if one.hits]  # what is merged here goes on apart
+        return self._joined([replace(one, best=list(one.best)) for one in self if one.hits])
+
+    def settled(self) -> list[Hypothesis]:
+        """The same, as probable as all views together make them. Takes a second for some hundred views with boxes."""
+        ones = sorted(self, key=lambda one: one.number)
+        prior = np.array([self._prior if one.layers > 0.0 else self._prior_free for one in ones])
+        odds = settled(
+            prior + self._looks.unclaimed(len(ones)), self._looks.claims, self._config.evidence.most_log_odds
+        )
+        told = zip(ones, odds.tolist(), strict=True)
+        return self._joined([replace(one, best=list(one.best), log_odds=said) for one, said in told if one.hits])
+
+    def _joined(self, hit: list[Hypothesis]) -> list[Hypothesis]:
+        """What is merged here goes on apart."""
         free = sorted((one for one in hit if one.layers == 0.0), key=lambda one: -one.log_odds)
         kept = [one for one in hit if one.layers > 0.0]
         for one in free:
@@ -136,6 +163,7 @@ class Hypotheses:
         return [one for one in found if np.linalg.norm(one.mean_m - place_m) < radius_m]
 
     def _put(self, one: Hypothesis) -> None:
+        one.number, self._count = self._count, self._count + 1
         x, y = np.floor(one.mean_m / BLOCK_M)
         self._blocks[int(x), int(y)].append(one)
 
@@ -189,25 +217,19 @@ class Hypotheses:
         one.lasting_rad, one.lasting_m = view.lasting_rad, view.lasting_m
         one.show(View(view.stamp_ns, sighting.box_px, sighting.confidence, sighting.range_m), config.views_kept)
 
-    def _missed(self, one: Hypothesis, sightings: list[Sighting], depth: DepthImage) -> None:
-        column = np.column_stack([np.tile(one.mean_m, (len(COLUMN_M), 1)), COLUMN_M])
-        column[:, 2] += depth.ground.at(one.mean_m[None])[0]
-        seen = depth.look(column)
-        shown = depth.unhidden(seen)
-        if shown.mean() < LEAST_SHOWN:
-            return
-        range_m = float(np.linalg.norm(one.mean_m - depth.view.position_m[:2]))
-        u = float(np.median(seen[shown, 0]))
-        covered = any(box.box_px[0] <= u <= box.box_px[2] for box in sightings)
-        share = self._config.covered if covered else 1.0
-        fresh = one.freshness(depth.view.position_m[:2], self._config)
-        one.add(share * fresh * miss(range_m, self._config.farthest_m, self._config.evidence), self._config)
+    def _missed(self, one: Hypothesis, view: CameraView, *, covered: bool) -> None:
+        config, from_m = self._config, view.position_m[:2]
+        share = config.covered if covered else 1.0
+        range_m = float(np.linalg.norm(one.mean_m - from_m))
+        one.add(share * one.freshness(from_m, config) * miss(range_m, config.farthest_m, config.evidence), config)
         one.views += 1
 
     @staticmethod
     def _squared(one: Hypothesis, other: Hypothesis) -> float:
         away = one.mean_m - other.mean_m
-        return float(away @ np.linalg.solve(one.covariance + other.covariance, away))
+        free = (one.layers == 0.0) + (other.layers == 0.0)
+        spread = one.covariance + other.covariance + free * NEAR_SIDE_M**2 * np.eye(2)
+        return float(away @ np.linalg.solve(spread, away))
 
     def _merge(self, into: Hypothesis, other: Hypothesis) -> None:
         if into.layers == 0.0:

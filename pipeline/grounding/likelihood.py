@@ -24,9 +24,14 @@ def hit(confidence: float, range_m: float, farthest_m: float, config: EvidenceCo
 
     share: how probable it is that the box means this tree, and not another one near it.
     """
-    sure = min(max(confidence, 0.05), 0.95)
-    ratio = recall(range_m, farthest_m, config) / config.false_share * math.sqrt(sure / (1.0 - sure))
+    ratio = recall(range_m, farthest_m, config) / config.false_share * sureness(confidence)
     return math.log(1.0 + share * max(ratio - 1.0, 0.0))
+
+
+def sureness(confidence: float) -> float:
+    """What a box counts beside the detector's usual one."""
+    sure = min(max(confidence, 0.05), 0.95)
+    return math.sqrt(sure / (1.0 - sure))
 
 
 def miss(range_m: RangeT, farthest_m: float, config: EvidenceConfig) -> RangeT:

@@ -7,14 +7,12 @@ import numpy.typing as npt
 
 from pipeline.grounding.evidence import Evidence
 from pipeline.grounding.ground import Ground
-from pipeline.grounding.hypotheses import Hypothesis
+from pipeline.grounding.hypotheses import NEAR_SIDE_M, Hypothesis
 from pipeline.grounding.likelihood import probability
 from pipeline.grounding.surroundings import PointSource
 from pipeline.trees import Tree
 
 Array = npt.NDArray[np.float64]
-NEAR_SIDE_M = 0.35
-"""Without a stem the place is that of what was seen, mostly from one side."""
 BASE_SIGMA_M = 0.15
 CROWN_M = 4.0
 AROUND_M = 14.0
