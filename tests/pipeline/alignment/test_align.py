@@ -65,9 +65,9 @@ def test_another_stand_is_not_taken_for_this_one(tmp_path):
     assert not run(Task(air, ground, SEARCH), lambda _: lambda _: None).alignment.sure
 
 
-def walked(folder, stand, at_m=(0.0, 0.0), radius_m=16.0, yaw_deg=140.0):
+def walked(folder, stand, at_m, radius_m):
     """Two walks of which the second lies in a local frame, and the transform that is looked for."""
-    local = Transform((500_000.0, 5_400_000.0), 500_000.0, 5_400_000.0, 480.0, yaw_deg)
+    local = Transform((500_000.0, 5_400_000.0), 500_000.0, 5_400_000.0, 480.0, 140.0)
     first = write_las(folder / "monday.laz", from_the_ground(stand, radius_m, OFF, crowns=False), None)
     seen = from_the_ground(stand, radius_m, local, crowns=False, at_m=at_m, walk=1, missed=0.1)
     done = run(
@@ -78,9 +78,8 @@ def walked(folder, stand, at_m=(0.0, 0.0), radius_m=16.0, yaw_deg=140.0):
     return done.alignment, into.apply(seen[::50]), OFF.inverse().apply(local.apply(seen[::50]))
 
 
-@pytest.mark.parametrize("yaw_deg", [140.0, -65.0])
-def test_two_walks_in_one_stand_find_each_other_without_any_coordinates(tmp_path, yaw_deg):
-    found, moved, expected = walked(tmp_path, grow("mixed", 6, side_m=60.0), (9.0, 5.0), 14.0, yaw_deg)
+def test_two_walks_in_one_stand_find_each_other_without_any_coordinates(tmp_path):
+    found, moved, expected = walked(tmp_path, grow("mixed", 6, side_m=60.0), (9.0, 5.0), 14.0)
     assert found.sure, found.doubts
     assert np.abs(moved - expected).max() < 0.4
 
