@@ -20,8 +20,6 @@ from edge.config import Config
 from edge.errors import ClusterError, UsageError
 from edge.process.watch import Watch
 
-REFINE = "gtsam"
-"""What only the extra `refine` brings."""
 _EVERY_S = 0.5
 
 
@@ -33,6 +31,11 @@ class Look(msgspec.Struct, frozen=True):
     memory: float
     threads: int
     refine: bool
+
+
+def can_refine() -> bool:
+    """Whether what the extra `refine` brings is there."""
+    return all(find_spec(name) is not None for name in ("gtsam", "small_gicp"))
 
 
 def version() -> str:
@@ -47,7 +50,7 @@ def look(directory: Path, dask_worker: Worker) -> Look:
     except UsageError:
         sessions = 0
     resources, threads = dask_worker.state.total_resources, dask_worker.state.nthreads
-    return Look(__version__, sessions, resources.get("memory", 0.0), threads, find_spec(REFINE) is not None)
+    return Look(__version__, sessions, resources.get("memory", 0.0), threads, can_refine())
 
 
 def run(step: Step, config: Config, expected: str, topic: str) -> Finished:

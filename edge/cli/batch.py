@@ -94,12 +94,12 @@ def _worked(
     from edge.batch.cluster import fit_workers, hush
     from edge.batch.plan import most_memory, plan
     from edge.batch.run import Batch
-    from edge.batch.worker import REFINE
+    from edge.batch.worker import can_refine
 
     if not args.verbose:
         hush()
     refine = not args.no_refine
-    if refine and not args.scheduler and find_spec(REFINE) is None:
+    if refine and not args.scheduler and not can_refine():
         bar.say("the refinement is left out: it needs the extra `refine`, which is not installed")
         refine = False
     plans = [plan(session, refine=refine) for session in sessions]
