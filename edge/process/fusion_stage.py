@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.messages import GnssFix
+from edge.process.clocks import apart
 from edge.process.estimators import Smooth
 from edge.process.odometry_stage import FIXES, TRACK, read_fixes
 from pipeline.gnss.config import FusionConfig
@@ -43,7 +44,7 @@ class FusionStage:
         """Write the placement, unless the fixes cannot tell where the session was."""
         track = read_track(self.odometry / TRACK)
         fixes = read_fixes(self.odometry / FIXES)
-        facts = FusionFacts(fixes=len(fixes), why=_why_not(track, len(fixes)))
+        facts = FusionFacts(fixes=len(fixes), why=_why_not(track, fixes, self.config.stamped_late_s))
         if not facts.why:
             facts = self._place(track, fixes, facts, folder, advance)
         (folder / FACTS).write_bytes(msgspec.json.encode(facts))
@@ -80,10 +81,14 @@ class FusionStage:
         return facts
 
 
-def _why_not(track: npt.NDArray[np.void], fixes: int) -> str:
+def _why_not(track: npt.NDArray[np.void], fixes: list[GnssFix], late_s: float) -> str:
     if not len(track):
         return "there is no odometry"
-    return "" if fixes else "there are no GNSS fixes in the recording, or they were not asked for"
+    if not fixes:
+        return "there are no GNSS fixes in the recording, or they were not asked for"
+    stamps = np.array([fix.stamp_ns for fix in fixes]) - round(1e9 * late_s)
+    off = apart(stamps, track["stamp_ns"])
+    return f"of the fixes {off}; fusion.stamped_late_s takes off what they are late" if off else ""
 
 
 def write_placement(path: Path, placement: Placement) -> None:

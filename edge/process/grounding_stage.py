@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from edge.process import fusion_stage, odometry_stage
 from edge.process.camera_way import CameraWay
+from edge.process.clocks import apart
 from edge.process.detections_file import DETECTIONS, read_detections
 from edge.process.fusion_stage import read_placement
 from edge.process.places import Places
@@ -54,7 +55,8 @@ class GroundingStage:
         odometry = self.places.odometry
         tiles = TilePoints(odometry / odometry_stage.TILES, self.tile_m, POINTS_M)
         grounding = Grounding(tiles, msgspec.structs.replace(self.config, target=target))
-        where = CameraWay(read_track(odometry / odometry_stage.TRACK), placement, self.rig)
+        track = read_track(odometry / odometry_stage.TRACK)
+        where = CameraWay(track, placement, self.rig)
         searched = _Searched(grounding, where)
         for k, frame in enumerate(frames):
             facts.lost += not searched.look(frame)
@@ -64,6 +66,12 @@ class GroundingStage:
         write_trees(folder / TREES, trees)
         searched.write(folder)
         self._count(facts, grounding, trees)
+        late_ns = round(1e9 * self.rig.late_s)
+        off = apart(np.array([frame.stamp_ns for frame in frames], np.int64) - late_ns, track["stamp_ns"])
+        if off:
+            facts.notes += (
+                f"of the images {off}; timing.camera_late_s of the calibration takes off what they are late",
+            )
         facts.seconds = time.monotonic() - started_s
         (folder / FACTS).write_bytes(msgspec.json.encode(facts))
         return trees
