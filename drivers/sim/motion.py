@@ -23,15 +23,21 @@ CLIMB_S = 4.0
 HARMONICS = 14
 REACH_SIGMAS = 3.0
 HELD_S = 0.05
+ROLL_S = 1.2
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """How long the carrier stands at the start, half-way and (at least, before the truth ends) at the end."""
+    """How long the carrier stands at the start, at `stops` on the way and (at least, before the truth ends) at the end.
+
+    roll_deg: by which the payload is rolled at every second stop, to the left and to the right in turn.
+    """
 
     rest_s: float = 10.0
     stop_s: float = 4.0
     end_s: float = 3.0
+    stops: int = 1
+    roll_deg: float = 0.0
 
 
 def walk(
@@ -39,7 +45,7 @@ def walk(
 ) -> Trajectory:
     """The trajectory of `base_link`. shake scales hand shake and vibration."""
     rng = np.random.default_rng([seed, 51])
-    along = _along(route, carrier, schedule, rng)
+    along, stopped_s = _along(route, carrier, schedule, rng)
     xy, ground, heading = _follow(route, terrain, along)
     speed = np.gradient(along, DT_S)
     alive = _alive(schedule, len(along))
@@ -49,7 +55,7 @@ def walk(
     shaken, twisted = _shake(carrier, shake, speed, alive, t, rng=rng)
     offset, turn = offset + shaken, turn + twisted
     yaw_rate = np.gradient(heading, DT_S)
-    turn[:, 0] -= carrier.bank * np.arctan(speed * yaw_rate / GRAVITY_M_S2)
+    turn[:, 0] += _rolled(schedule, stopped_s, t) - carrier.bank * np.arctan(speed * yaw_rate / GRAVITY_M_S2)
     turn[:, 1] += np.radians(carrier.mount_pitch_deg) + carrier.tilt * _smooth(np.gradient(speed, DT_S), 0.3)
     turn[:, 2] += heading + np.radians(carrier.gaze_deg) * alive * _noise(t, 0.03, 0.2, rng)
     ahead, left = offset[:, 0], offset[:, 1]
@@ -58,17 +64,19 @@ def walk(
     return Trajectory(np.column_stack([x, y, ground + carrier.height_m + climb + offset[:, 2], turn]))
 
 
-def _along(route: Route, carrier: Carrier, schedule: Schedule, rng: np.random.Generator) -> Doubles:
-    """Distance along the route (m) at each knot of the spline."""
+def _along(
+    route: Route, carrier: Carrier, schedule: Schedule, rng: np.random.Generator
+) -> tuple[Doubles, tuple[float, ...]]:
+    """Distance along the route (m) at each knot of the spline, and when each stop begins (s)."""
     step = STEP_M / 5.0
     s: Doubles = np.arange(0.0, route.length_m, step, dtype=np.float64)
     curvature = np.abs(_curvature(route))
     limit = np.sqrt(carrier.sideways_m_s2 / np.maximum(curvature, 1e-3))
     wave = 1.0 + 0.06 * _noise(s, 0.02, 0.08, rng)
     fastest = np.minimum(carrier.speed_m_s * wave, np.interp(s, STEP_M * np.arange(len(limit)), limit))
-    middle = len(s) // 2
+    stops = [len(s) * k // (schedule.stops + 1) for k in range(1, schedule.stops + 1)]
     squared = fastest**2
-    squared[[0, middle, -1]] = 0.0
+    squared[[0, *stops, -1]] = 0.0
     gain = 2.0 * carrier.acceleration_m_s2 * step
     for k in range(1, len(s)):
         squared[k] = min(squared[k], squared[k - 1] + gain)
@@ -78,11 +86,22 @@ def _along(route: Route, carrier: Carrier, schedule: Schedule, rng: np.random.Ge
     took = step / (0.5 * (speed[1:] + speed[:-1]))
     begin = schedule.rest_s + SETTLE_S + _airborne_s(carrier)
     when = begin + np.concatenate([[0.0], np.cumsum(took)])
-    when[middle + 1 :] += schedule.stop_s
-    when = np.insert(when, middle + 1, when[middle] + schedule.stop_s)
-    s = np.insert(s, middle + 1, s[middle])
+    for stop in reversed(stops):
+        when[stop + 1 :] += schedule.stop_s
+        when = np.insert(when, stop + 1, when[stop] + schedule.stop_s)
+        s = np.insert(s, stop + 1, s[stop])
     total = when[-1] + SETTLE_S + _airborne_s(carrier) + schedule.end_s
-    return _smooth(np.interp(DT_S * np.arange(int(total / DT_S) + 1), when, s), SPEED_SIGMA_S)
+    along = _smooth(np.interp(DT_S * np.arange(int(total / DT_S) + 1), when, s), SPEED_SIGMA_S)
+    return along, tuple(float(when[stop + k]) for k, stop in enumerate(stops))
+
+
+def _rolled(schedule: Schedule, stopped_s: tuple[float, ...], t: Doubles) -> Doubles:
+    """Roll (n,) in rad on top of the carrier's: eased in and out while it stands."""
+    roll = np.zeros_like(t)
+    for k, begin in enumerate(stopped_s[1::2]):
+        inside = np.clip(np.minimum(t - begin, begin + schedule.stop_s - t) / ROLL_S, 0.0, 1.0)
+        roll += (-1.0) ** k * np.radians(schedule.roll_deg) * inside**3 * (10.0 - 15.0 * inside + 6.0 * inside**2)
+    return roll
 
 
 def _follow(route: Route, terrain: Terrain, along: Doubles) -> tuple[Doubles, Doubles, Doubles]:

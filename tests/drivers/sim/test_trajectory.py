@@ -5,7 +5,7 @@ import pytest
 
 from drivers.errors import SimulationError
 from drivers.sim.carriers import CARRIERS, carrier
-from drivers.sim.scenarios import WorldConfig
+from drivers.sim.scenarios import WorldConfig, scenario
 from drivers.sim.world import build
 
 S = 1_000_000_000
@@ -116,3 +116,14 @@ def test_same_seed_same_walk_other_seed_another():
 def test_unknown_carrier_is_refused():
     with pytest.raises(SimulationError, match="handheld"):
         carrier("horse")
+
+
+def test_who_calibrates_stands_at_six_places_and_rolls_the_payload_at_every_second():
+    world = build(scenario("standing"))
+    t = np.arange(12 * S, world.trajectory.duration_ns - 4 * S, S // 10)
+    at = world.trajectory.at(t)
+    still = np.linalg.norm(at.velocity_m_s, axis=1) < 0.05
+    roll_deg = np.degrees(np.arctan2(at.rotation[:, 2, 1], at.rotation[:, 2, 2]))
+    places = np.split(np.flatnonzero(still), np.flatnonzero(np.diff(np.flatnonzero(still)) > 20) + 1)
+    held = [np.median(roll_deg[place]) for place in places if len(place) > 40]
+    np.testing.assert_allclose(held, [0.0, 60.0, 0.0, -60.0, 0.0, 60.0], atol=3.0)
