@@ -30,7 +30,8 @@ ROLL_S = 1.2
 class Schedule:
     """How long the carrier stands at the start, at `stops` on the way and (at least, before the truth ends) at the end.
 
-    roll_deg: by which the payload is rolled at every second stop, to the left and to the right in turn.
+    roll_deg: by which the payload is rolled at every second stop, to the left and to the right in turn. calm: who stops
+    does not look about.
     """
 
     rest_s: float = 10.0
@@ -38,6 +39,7 @@ class Schedule:
     end_s: float = 3.0
     stops: int = 1
     roll_deg: float = 0.0
+    calm: bool = False
 
 
 def walk(
@@ -48,7 +50,7 @@ def walk(
     along, stopped_s = _along(route, carrier, schedule, rng)
     xy, ground, heading = _follow(route, terrain, along)
     speed = np.gradient(along, DT_S)
-    alive = _alive(schedule, len(along))
+    alive = _alive(schedule, stopped_s if schedule.calm else (), len(along))
     t: Doubles = DT_S * np.arange(len(along), dtype=np.float64)
     climb = carrier.climb_m * _climb(schedule, carrier, t)
     offset, turn = _gait(carrier, speed, t, rng)
@@ -177,12 +179,14 @@ def _climb(schedule: Schedule, carrier: Carrier, t: Doubles) -> Doubles:
     return np.asarray(share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
 
 
-def _alive(schedule: Schedule, count: int) -> Doubles:
-    """One between the two rests, zero in them, smooth in between."""
+def _alive(schedule: Schedule, stopped_s: tuple[float, ...], count: int) -> Doubles:
+    """One between the two rests, zero in them and in the stops that begin then, smooth in between."""
     alive = np.ones(count)
     held_s = REACH_SIGMAS * ALIVE_SIGMA_S + HELD_S
     alive[: int((schedule.rest_s + held_s) / DT_S)] = 0.0
     alive[int(-(schedule.end_s + held_s) / DT_S) :] = 0.0
+    for begin_s in stopped_s:
+        alive[int(begin_s / DT_S) : int((begin_s + schedule.stop_s) / DT_S)] = 0.0
     return _smooth(alive, ALIVE_SIGMA_S)
 
 

@@ -49,7 +49,7 @@ SCENARIOS: dict[str, WorldConfig] = {
         WorldConfig("bicycle", forest="open_trail", path="out_and_back", length_m=400.0, carrier="bicycle"),
         WorldConfig("uav", length_m=200.0, carrier="uav"),
         WorldConfig("shaking", length_m=80.0, shake=6.0),
-        WorldConfig("standing", length_m=50.0, schedule=Schedule(stop_s=8.0, stops=6, roll_deg=60.0)),
+        WorldConfig("standing", length_m=50.0, schedule=Schedule(3.0, 8.0, 3.0, 6, 60.0, calm=True)),
         WorldConfig("loop_800", length_m=800.0),
         WorldConfig("loop_1200", length_m=1200.0),
         WorldConfig("out_and_back_1200", path="out_and_back", length_m=1200.0, carrier="backpack"),

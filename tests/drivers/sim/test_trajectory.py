@@ -120,7 +120,7 @@ def test_unknown_carrier_is_refused():
 
 def test_who_calibrates_stands_at_six_places_and_rolls_the_payload_at_every_second():
     world = build(scenario("standing"))
-    t = np.arange(12 * S, world.trajectory.duration_ns - 4 * S, S // 10)
+    t = np.arange(7 * S, world.trajectory.duration_ns - 4 * S, S // 10)
     at = world.trajectory.at(t)
     still = np.linalg.norm(at.velocity_m_s, axis=1) < 0.05
     roll_deg = np.degrees(np.arctan2(at.rotation[:, 2, 1], at.rotation[:, 2, 2]))
