@@ -11,7 +11,7 @@ from drivers.errors import ProtocolError
 from drivers.gopro.gpmf import keys, samples
 from tests.edge.onboard.cards import gyro_payloads, key, nested
 
-REAL = Path("/work/shared/data/gopro/max-heromode.mp4")
+REAL = Path(__file__).parents[3] / "../shared/data/gopro/max-heromode.mp4"
 GYRO = frozenset({"GYRO"})
 
 

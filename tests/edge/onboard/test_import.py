@@ -14,7 +14,7 @@ from tests.edge.onboard.cards import gyro_payloads, write_mp4
 from tests.edge.recording.recording_scene import UTC_NS
 from tests.pipeline.calibration.turns import SECOND, Turns
 
-REAL = Path("/work/shared/data/gopro/max-heromode.mp4")
+REAL = Path(__file__).parents[3] / "../shared/data/gopro/max-heromode.mp4"
 MOUNTED = Rotation.from_euler("zyx", [90.0, 5.0, -85.0], degrees=True)
 """Camera's gyroscope in the body."""
 BEGIN_S = 7.25

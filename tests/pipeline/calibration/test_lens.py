@@ -11,7 +11,7 @@ from pipeline.calibration.errors import CalibrationError
 from pipeline.calibration.lens import board_pose, fit_lens
 from tests.pipeline.calibration.boards import CHARUCO, CHESS, FISHEYE, PINHOLE, photograph, poses, sightings
 
-REAL = Path("/work/shared/data/calibration")
+REAL = Path(__file__).parents[3] / "../shared/data/calibration"
 SIZE = (848, 480)
 
 
