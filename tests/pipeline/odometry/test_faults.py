@@ -51,9 +51,8 @@ SUFFERED = {
 BLIND = {"mounted_yaw": Status.DOUBTFUL}
 """Told, but the stated sigma does not cover it: all is turned by the same angle."""
 QUICK = {
-    *("walkers", "dust", "not_finite", "scans_disordered", "samples_disordered"),
-    *("crown", "handful", "laser_6", "samples_07", "silence_3", "saturated_unknown", "accel_bias", "leap_second"),
-    *("leap_back", "mounted_pitch"),
+    *("walkers", "not_finite", "scans_disordered", "crown", "laser_6", "silence_3", "accel_bias", "leap_second"),
+    "mounted_pitch",
 }
 
 
