@@ -146,3 +146,8 @@ def test_a_straightened_fisheye_picture_shows_straight_lines_where_a_pinhole_wou
     rows = range(20, 220, 20)
     middle = [np.sum(seen[row] * np.arange(seen.shape[1])) / seen[row].sum() for row in rows]
     assert middle == pytest.approx([pinhole.centre_px[0] + 0.4 * pinhole.focal_px[0]] * len(middle), abs=0.7)
+
+
+def test_fewer_places_than_three_are_not_believed(stands):
+    found = from_scene(stands[:2], CAMERA, guess(1, degrees=2.5))
+    assert "at least 3" in found.refusal
