@@ -65,7 +65,7 @@ def test_the_live_detector_is_up_beside_the_odometry(stage, tmp_path):
     stage.config.write_text(f'{stage.config.read_text()}[detection]\nmodel = "{model}"\n')
     with demo.recorder(stage) as client, demo.pipeline(stage) as process:
         demo.wait_for_pipeline(stage, process, client)
-        wait_for(lambda: (told := client.status().detecting) is not None and told.state == "waiting", 30.0)
+        wait_for(lambda: (told := client.status().detecting) is not None and told.state == "waiting")
         detecting = client.status().detecting
     assert detecting is not None
     assert (detecting.model, detecting.device, detecting.note) == ("spot", "cpu", "no video from the camera")

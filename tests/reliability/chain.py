@@ -19,11 +19,9 @@ from edge import toml_table
 from edge.control.client import ControlClient
 from edge.control.messages import Reply, Request, Sensor, Status
 from edge.errors import ControlError
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 90.0
-"""Of every wait here: a machine may be busy with other things."""
 SENSORS = ("livox", "reach", "gopro")
 DELIVERS = ("ok", "degraded")
 _chosen = random.SystemRandom()
@@ -166,7 +164,7 @@ class Chain:
         command = [*self.launcher, sys.executable, "-m", *self._module, "recorder", "--config", str(self.config)]
         with self.log.open("ab") as log:
             self.recorder = subprocess.Popen(command, cwd=ROOT, stderr=log, stdin=subprocess.DEVNULL)
-        wait_for(self._answers, PATIENCE_S)
+        wait_for(self._answers)
 
     def kill_recorder(self) -> None:
         """As a pulled battery."""
@@ -210,21 +208,21 @@ class Chain:
     def until_delivering(self, *names: str) -> None:
         """Until these sensors, or all, deliver."""
         for name in names or self.sensors:
-            wait_for(lambda name=name: self.state(name) in DELIVERS and self.received(name) > 0, PATIENCE_S)
+            wait_for(lambda name=name: self.state(name) in DELIVERS and self.received(name) > 0)
 
     def until_more(self, count: int, *names: str) -> None:
         """Until so many more messages came from each of these sensors, or from all."""
         wanted = {name: self.received(name) + count for name in names or self.sensors}
-        wait_for(lambda: all(self.received(name) >= least for name, least in wanted.items()), PATIENCE_S)
+        wait_for(lambda: all(self.received(name) >= least for name, least in wanted.items()))
 
     def until_told(self, words: str) -> str:
         """Until the operator reads this; the whole sentence."""
-        wait_for(lambda: any(words in text for text in tuple(self.told)), PATIENCE_S)
+        wait_for(lambda: any(words in text for text in tuple(self.told)))
         return next(text for text in self.told if words in text)
 
     def until_verdict(self) -> tuple[str, tuple[str, ...]]:
         """Of the session just stopped."""
-        wait_for(lambda: self.status and self.status.verdict and not self.status.verdict.running, PATIENCE_S)
+        wait_for(lambda: self.status and self.status.verdict and not self.status.verdict.running)
         assert self.status is not None
         assert self.status.verdict is not None
         return self.status.verdict.verdict, self.status.verdict.reasons

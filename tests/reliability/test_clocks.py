@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.reliability.chain import PATIENCE_S, SENSORS, Chain
+from tests.reliability.chain import SENSORS, Chain
 from tests.reliability.session import Session
 from tests.waiting import wait_for
 
@@ -49,7 +49,7 @@ def test_a_step_of_a_sensors_clock_is_recorded_and_moves_no_stamp(tmp_path, figu
         for name in SENSORS:
             chain.fault(name, f"clock_step={step_s}")
         for name in SENSORS:
-            wait_for(lambda name=name: stepped(chain, name), PATIENCE_S)
+            wait_for(lambda name=name: stepped(chain, name))
         chain.until_more(30)
         chain.stop()
         verdict, reasons = chain.until_verdict()

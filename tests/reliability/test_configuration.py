@@ -48,7 +48,6 @@ BROKEN = {
 }
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_file_is_told_and_nothing_starts(tmp_path, monkeypatch, capsys, figures, name):
     monkeypatch.setattr("edge.cli.main._set_up_logging", lambda _verbose: None)
@@ -67,7 +66,7 @@ def test_a_broken_file_is_told_and_nothing_starts(tmp_path, monkeypatch, capsys,
 
 def test_a_missing_file_is_told_by_the_program_itself(tmp_path):
     command = [sys.executable, "-m", "edge.cli.main", "recorder", "--config", str(tmp_path / "gone.toml")]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ended.returncode == exit_codes.FAILED
     assert ended.stderr.endswith("gone.toml: no such configuration file; leave --config out to use the defaults\n")
     assert ended.stdout == ""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.reliability.chain import PATIENCE_S, Chain
+from tests.reliability.chain import Chain
 from tests.reliability.session import Session
 from tests.reliability.sources import missing
 from tests.waiting import wait_for
@@ -42,8 +42,8 @@ def test_a_full_card_ends_the_recording_and_keeps_what_is_there(tmp_path, figure
     with Chain(tmp_path, recording={"min_free_mib": reserve_mib}, launcher=launcher) as chain:
         chain.until_delivering()
         folder = chain.start()
-        wait_for(lambda: chain.status and chain.status.state == "recording", PATIENCE_S)
-        wait_for(lambda: ended(chain), PATIENCE_S)
+        wait_for(lambda: chain.status and chain.status.state == "recording")
+        wait_for(lambda: ended(chain))
         words = chain.until_told("disk reserve reached" if reserve_mib else "cannot be written")
         chain.until_verdict()
         copy = tmp_path / "copy" / folder.name
@@ -75,8 +75,8 @@ def test_a_file_that_may_grow_no_further_is_kept_and_repaired_at_the_next_start(
     with Chain(tmp_path, launcher=["prlimit", f"--fsize={12 << 20}:"]) as chain:
         chain.until_delivering()
         folder = chain.start()
-        wait_for(lambda: chain.status and chain.status.state == "recording", PATIENCE_S)
-        wait_for(lambda: ended(chain), PATIENCE_S)
+        wait_for(lambda: chain.status and chain.status.state == "recording")
+        wait_for(lambda: ended(chain))
         words = chain.until_told("cannot be written")
         again = chain.start()
         chain.until_more(5)
@@ -84,7 +84,7 @@ def test_a_file_that_may_grow_no_further_is_kept_and_repaired_at_the_next_start(
         chain.stop_recorder()
         chain.launcher = []
         chain.start_recorder()
-        wait_for(lambda: not list(folder.glob("*.active")) and (folder / "metadata.yaml").exists(), PATIENCE_S)
+        wait_for(lambda: not list(folder.glob("*.active")) and (folder / "metadata.yaml").exists())
     session = Session(folder)
     assert session.partial == session.doubled == []
     assert sum(path.stat().st_size for path in folder.glob("*.mcap")) > 10 << 20

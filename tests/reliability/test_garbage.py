@@ -10,7 +10,7 @@ import pytest
 
 from drivers.livox.config import Config as LivoxConfig
 from edge.errors import ControlError
-from tests.reliability.chain import PATIENCE_S, SENSORS, Chain
+from tests.reliability.chain import SENSORS, Chain
 from tests.reliability.session import Session
 from tests.reliability.sources import missing
 from tests.waiting import wait_for
@@ -132,7 +132,7 @@ def test_clients_that_never_read_or_flood_hold_up_nobody(tmp_path, figures):
                 one.connect(str(chain.socket))
                 one.sendall(b'{"type":"request","command":"subscribe"}\n')
             with running(flood, of=chain):
-                wait_for(lambda: "does not read" in chain.said(), PATIENCE_S)
+                wait_for(lambda: "does not read" in chain.said())
                 chain.until_more(30)
                 assert chain.request("mark", text="in the flood").ok
         refused = asked_by_one_too_many(chain)

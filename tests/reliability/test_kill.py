@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.reliability.chain import PATIENCE_S, Chain
+from tests.reliability.chain import Chain
 from tests.reliability.session import Session
 from tests.waiting import wait_for
 
@@ -37,7 +37,7 @@ def repaired(folder: Path) -> bool:
 
 def lost_s(folder: Path, killed_ns: int) -> float:
     """From the newest message that two readers find to the kill."""
-    wait_for(lambda: repaired(folder), PATIENCE_S)
+    wait_for(lambda: repaired(folder))
     session = Session(folder)
     assert session.doubled == session.partial == []
     return (killed_ns - session.last_host_ns()) / 1e9

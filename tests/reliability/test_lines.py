@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.reliability.chain import PATIENCE_S, Chain
+from tests.reliability.chain import Chain
 from tests.reliability.session import Session
 from tests.reliability.sources import missing
 from tests.waiting import wait_for
@@ -21,8 +21,8 @@ def recorded(chain: Chain, kind: str, *faults: str) -> Session:
     chain.until_more(20)
     for name in ("livox", "gopro"):
         chain.fault(name, *faults)
-    wait_for(lambda: chain.truth("livox")["points"][kind] >= PACKETS, PATIENCE_S)
-    wait_for(lambda: chain.truth("livox")["imu"][kind] >= PACKETS // 20, PATIENCE_S)
+    wait_for(lambda: chain.truth("livox")["points"][kind] >= PACKETS)
+    wait_for(lambda: chain.truth("livox")["imu"][kind] >= PACKETS // 20)
     for name in ("livox", "gopro"):
         chain.fault(name)
     chain.until_more(30)

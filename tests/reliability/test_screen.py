@@ -12,9 +12,9 @@ import termios
 
 import pytest
 
-from tests.reliability.chain import PATIENCE_S, ROOT, Chain
+from tests.reliability.chain import ROOT, Chain
 from tests.reliability.session import Session
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(shutil.which("setsid") is None, reason="no setsid here")]
 
@@ -52,10 +52,10 @@ def test_a_screen_that_ends_stops_nothing(tmp_path, figures, end):
     with Chain(tmp_path) as chain:
         chain.until_delivering()
         screen = Screen(chain)
-        wait_for(lambda: screen.shows(b"Press SPACE to start"), PATIENCE_S)
+        wait_for(lambda: screen.shows(b"Press SPACE to start"))
         screen.press(b" ")
-        wait_for(lambda: chain.status and chain.status.state == "recording", PATIENCE_S)
-        wait_for(lambda: screen.shows(b"Recording"), PATIENCE_S)
+        wait_for(lambda: chain.status and chain.status.state == "recording")
+        wait_for(lambda: screen.shows(b"Recording"))
         chain.until_more(10)
         if end == "kill":
             screen.process.send_signal(signal.SIGKILL)
@@ -70,7 +70,7 @@ def test_a_screen_that_ends_stops_nothing(tmp_path, figures, end):
         assert chain.status.recording is not None
         folder = chain.recordings / chain.status.recording.session
         again = Screen(chain)
-        wait_for(lambda: again.shows(b"mission"), PATIENCE_S)
+        wait_for(lambda: again.shows(b"mission"))
         again.process.kill()
         again.process.wait()
         again.hang_up()

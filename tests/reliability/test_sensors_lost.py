@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.sim.payload import Payload
-from tests.reliability.chain import PATIENCE_S, SENSORS, Chain, payload_config
+from tests.reliability.chain import SENSORS, Chain, payload_config
 from tests.reliability.session import Session
 from tests.waiting import wait_for
 
@@ -19,8 +19,8 @@ def largest_gap_s(session: Session, sensor: str) -> float:
 def go_and_come_back(chain: Chain, name: str) -> str:
     """Until the health is red, the others have gone on, and the sensor delivers again; what was said."""
     others = [other for other in SENSORS if other != name]
-    wait_for(lambda: chain.state(name) not in {"ok", ""}, PATIENCE_S)
-    wait_for(lambda: chain.state(name) in {"searching", "failed"}, PATIENCE_S)
+    wait_for(lambda: chain.state(name) not in {"ok", ""})
+    wait_for(lambda: chain.state(name) in {"searching", "failed"})
     sensor = chain.sensor(name)
     assert sensor is not None
     said = f"{sensor.name} {sensor.state}: {sensor.problem}. {sensor.advice}"
@@ -40,7 +40,7 @@ def test_a_killed_sensor_is_told_and_picked_up_again(tmp_path, figures, name):
         assert chain.status.state == "recording"
         chain.start_emulator(name, uptime_s=0.0)
         chain.until_more(20, name)
-        wait_for(lambda: chain.state(name) in {"ok", "degraded"}, PATIENCE_S)
+        wait_for(lambda: chain.state(name) in {"ok", "degraded"})
         chain.stop()
         verdict, reasons = chain.until_verdict()
     session = Session(folder)
@@ -62,11 +62,11 @@ def test_a_sensor_that_reboots_is_told_and_goes_on(tmp_path, figures, name):
         chain.until_more(10)
         chain.fault(name, "reboot")
         if name == "livox":  # started anew ten times as fast as the real one: the gap is about a second
-            wait_for(lambda: chain.truth(name).get("reboots") == 1, PATIENCE_S)
+            wait_for(lambda: chain.truth(name).get("reboots") == 1)
         else:
-            wait_for(lambda: chain.state(name) not in {"ok", "degraded"}, PATIENCE_S)
+            wait_for(lambda: chain.state(name) not in {"ok", "degraded"})
         chain.until_more(20, name)
-        wait_for(lambda: chain.state(name) in {"ok", "degraded"}, PATIENCE_S)
+        wait_for(lambda: chain.state(name) in {"ok", "degraded"})
         chain.until_more(10)
         chain.stop()
         verdict, reasons = chain.until_verdict()

@@ -8,6 +8,7 @@ import pytest
 
 from edge.control.messages import Reply
 from tests.ui.fake_recorder import FakeRecorder
+from tests.waiting import PATIENCE_S
 from ui import samples
 from ui.app import Options, RecorderApp
 from ui.connection import SocketConnection
@@ -292,11 +293,11 @@ async def test_the_whole_way_over_a_real_socket(tmp_path):
                 while text not in "\n".join(str(line.content) for line in app.query(Line)):
                     await pilot.pause(0.02)
 
-            await asyncio.wait_for(sees("Press SPACE to start."), 10)
+            await asyncio.wait_for(sees("Press SPACE to start."), PATIENCE_S)
             await pilot.press("space")
-            await asyncio.wait_for(sees("0 marks"), 10)
+            await asyncio.wait_for(sees("0 marks"), PATIENCE_S)
             await pilot.press("m")
-            await asyncio.wait_for(sees("1 mark "), 10)
+            await asyncio.wait_for(sees("1 mark "), PATIENCE_S)
             assert [request.command for request in fake.heard] == ["hello", "subscribe", "start", "mark"]
 
 

@@ -7,11 +7,10 @@ import pytest
 
 from edge.control.messages import Request
 from tests.ui.fake_recorder import FakeRecorder
+from tests.waiting import PATIENCE_S
 from ui import connection as connection_module
 from ui.connection import SocketConnection
 from ui.messages import Connected, ConnectionLost, Replied, StatusArrived
-
-DEADLINE_S = 10.0
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +37,7 @@ async def until(inbox, kind):
             pass
         return message
 
-    return await asyncio.wait_for(find(), DEADLINE_S)
+    return await asyncio.wait_for(find(), PATIENCE_S)
 
 
 async def test_it_subscribes_and_posts_statuses_and_replies(tmp_path):

@@ -16,6 +16,7 @@ from drivers.messages import SensorEvent, VideoFrame
 from drivers.sim.faults import FaultPlan, parse
 from drivers.sim.gopro_device import Quirks
 from drivers.sim.gopro_emulator import Emulator
+from tests.waiting import PATIENCE_S
 
 _numbers = itertools.count(random.SystemRandom().randrange(1, 1 << 22))
 STREAM_PORT = random.SystemRandom().randrange(20_000, 32_000)
@@ -86,7 +87,7 @@ class Running:
 
     def end(self) -> None:
         self.stop.set()
-        self.thread.join(20)
+        self.thread.join(PATIENCE_S)
         assert not self.thread.is_alive()
 
     def _emit(self, message) -> None:

@@ -32,7 +32,7 @@ def server(answer: bytes | None):
         def handle(self):
             self.request.recv(4096)
             if answer is None:
-                release.wait(10)
+                release.wait()
             else:
                 self.request.sendall(answer)
 

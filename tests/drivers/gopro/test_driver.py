@@ -135,7 +135,7 @@ def test_a_reboot_begins_a_new_clock_and_the_recording_starts_again(monkeypatch)
     with camera("gopro:reboot@2") as emulated, Running(of(emulated)) as driver:
         driver.sensor.session_started()
         wait_for(lambda: emulated.device.recording)
-        wait_for(lambda: driver.told("stream clock began anew"), timeout_s=20)
+        wait_for(lambda: driver.told("stream clock began anew"))
         wait_for(lambda: len([e for e in driver.events if "recording started" in e.text]) == 2)
         clock = driver.sensor.health().clock
         assert clock is not None

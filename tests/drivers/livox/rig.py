@@ -17,7 +17,7 @@ from drivers.sim.faults import FaultPlan, parse
 from drivers.sim.livox_device import DeviceOptions
 from drivers.sim.livox_emulator import BROADCAST, Emulator
 from drivers.sim.sources import PointBlock
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 
 class Ramp:
@@ -84,7 +84,7 @@ def emulated(*faults: str, ready_s: float = 0.0, **device) -> Iterator[tuple[Emu
     thread = threading.Thread(target=emulator.run, args=(stop, None, bound.set))
     thread.start()
     try:
-        assert bound.wait(5.0)
+        assert bound.wait(PATIENCE_S)
         yield emulator, lidar, host
     finally:
         stop.set()
@@ -129,4 +129,4 @@ def quick(lidar: str, host: str, settings: dict | None = None) -> Config:
 def streaming(rig: Rig, scans: int = 3) -> None:
     """Wait for so many more scans."""
     wanted = len(rig.scans) + scans
-    wait_for(lambda: len(rig.scans) >= wanted, 15.0)
+    wait_for(lambda: len(rig.scans) >= wanted)

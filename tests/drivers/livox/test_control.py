@@ -12,6 +12,7 @@ from drivers.livox.control import ControlLink
 from drivers.livox.frames import Command, Frame, Kind, Sender, decode, encode
 from drivers.livox.keys import Key
 from tests.drivers.livox.rig import addresses
+from tests.waiting import PATIENCE_S
 
 Script = Callable[[Frame, int], list[bytes]]
 
@@ -25,7 +26,7 @@ def link_to():
         lidar, host = addresses()
         device = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         device.bind((lidar, 56100))
-        device.settimeout(5.0)
+        device.settimeout(PATIENCE_S)
 
         def serve() -> None:
             for number in range(3):

@@ -3,9 +3,9 @@
 import threading
 from contextlib import contextmanager
 
-from drivers.sim.faults import FaultPlan, parse
 from drivers.sim.gnss_geodesy import Datum
 from drivers.sim.sources import GnssEpoch
+from tests.waiting import PATIENCE_S
 
 DATUM = Datum()
 
@@ -20,10 +20,6 @@ class Circle:
         return GnssEpoch(latitude, longitude, height, 48.1, self.quality, 20, 0.7, 1.2, (0.011, 0.012, 0.02), 1.0, 90.0)
 
 
-def plan(*faults):
-    return FaultPlan("reach", [parse(f"reach:{fault}") for fault in faults])
-
-
 @contextmanager
 def in_thread(target, *args, **kwargs):
     """A thread that takes a stop event as its keyword `stop`."""
@@ -34,5 +30,5 @@ def in_thread(target, *args, **kwargs):
         yield
     finally:
         stop.set()
-        thread.join(10.0)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()

@@ -17,7 +17,7 @@ from drivers.reach import health, transport
 from drivers.reach.config import Config, SerialEndpoint, TcpEndpoint, parse_endpoint
 from drivers.reach.driver import Sensor
 from tests.drivers.reach import nmea_oracle
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 
 class Recorded(list):
@@ -37,7 +37,7 @@ def running(**config):
         yield sensor, recorded
     finally:
         stop.set()
-        thread.join(10.0)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()
 
 
@@ -158,7 +158,7 @@ def test_a_silent_tcp_link_is_opened_anew():
         port = server.getsockname()[1]
         with running(endpoint=f"tcp:127.0.31.8:{port}", silence_s=0.3):
             first, _ = server.accept()
-            server.settimeout(10.0)
+            server.settimeout(PATIENCE_S)
             second, _ = server.accept()
             first.close()
             second.close()
@@ -194,7 +194,10 @@ def test_bytes_that_are_no_nmea_are_said_to_be(monkeypatch):
     assert not recorded.of(NmeaSentence)
 
 
-def test_a_host_that_does_not_answer_is_given_up_at_once_when_asked_to_stop():
+def test_a_host_that_does_not_answer_is_given_up_at_once_when_asked_to_stop(monkeypatch):
+    dialling, dial = threading.Event(), transport._dial
+    monkeypatch.setattr(transport, "CONNECT_TIMEOUT_S", math.inf)
+    monkeypatch.setattr(transport, "_dial", lambda *args: (dialling.set(), dial(*args))[1])
     with socket.socket() as deaf:
         deaf.bind(("127.0.31.9", 0))
         deaf.listen(0)
@@ -208,9 +211,10 @@ def test_a_host_that_does_not_answer_is_given_up_at_once_when_asked_to_stop():
         sensor, stop = Sensor("reach", Config(endpoint=f"tcp:{address[0]}:{address[1]}")), threading.Event()
         thread = threading.Thread(target=sensor.run, args=(Recorded().append, stop), daemon=True)
         thread.start()
-        wait_for(lambda: sensor.health().state is SensorState.SEARCHING)
+        assert dialling.wait(PATIENCE_S)
+        assert sensor.health().state is SensorState.SEARCHING
         stop.set()
-        thread.join(2.0)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()
         for client in waiting:
             client.close()

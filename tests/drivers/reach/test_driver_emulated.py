@@ -1,7 +1,6 @@
 """Driver and emulator end to end, over a pseudo-terminal and over TCP, with faults."""
 
 import json
-import random
 import socket
 import time
 from itertools import pairwise
@@ -12,44 +11,41 @@ from drivers.driver import SensorState
 from drivers.messages import FixQuality, GnssFix, NmeaSentence, SensorEvent
 from drivers.reach.config import Config
 from drivers.reach.driver import Sensor
-from drivers.sim import reach_emulator
-from drivers.sim.reach_emulator import ReachSettings
+from drivers.sim.faults import parse
+from drivers.sim.reach_emulator import ReachSettings, Receiver
+from drivers.sim.reach_emulator_ports import PseudoTerminal, TcpServer
 from tests.drivers.reach import emulated, nmea_oracle
-from tests.waiting import wait_for
+from tests.drivers.switched import SwitchedPlan
+from tests.waiting import PATIENCE_S, wait_for
 
 
 class Setup:
-    """One emulator and one driver, ready to run."""
+    """One emulator and one driver, ready to run. The emulator's link is open from the start."""
 
     def __init__(self, folder, tcp=False, faults=(), **settings):
         self.recorded = []
         self.truth = folder / "truth.jsonl"
+        self.settings = ReachSettings(
+            **{"rate_hz": 10.0, "boot_s": 0.4, "acquire_s": 0.4, "utc_epoch_ns": time.time_ns()} | settings
+        )
         link = folder / "dev" / "gnss"
-        address = f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.{random.randint(1, 250)}"
-        with socket.create_server((address, 0)) as free:
-            port = free.getsockname()[1]
-        self.link = None if tcp else link
-        self.address = (address, port) if tcp else None
+        self.port = TcpServer("127.0.0.1", 0) if tcp else PseudoTerminal(link, self.settings.baud)
+        self.port.open()
         self.epoch_ns = time.monotonic_ns()
-        self.plan = emulated.plan(*faults)
-        self.settings = ReachSettings(**{"rate_hz": 10.0, "boot_s": 0.4, "acquire_s": 0.4} | settings)
-        endpoint = f"tcp:{address}:{port}" if tcp else f"serial:{link}"
+        self.plan = SwitchedPlan("reach", [parse(f"reach:{fault}") for fault in faults])
+        endpoint = "tcp:{}:{}".format(*self.port.address) if tcp else f"serial:{link}"
         self.sensor = Sensor("reach", Config(endpoint=endpoint, rate_hz=self.settings.rate_hz, reconnect_s=0.02))
 
     def emulator(self):
-        return emulated.in_thread(
-            reach_emulator.run,
-            emulated.Circle(),
-            self.plan,
-            self.epoch_ns,
-            pty=self.link,
-            tcp=self.address,
-            settings=self.settings,
-            truth=self.truth,
-        )
+        receiver = Receiver(emulated.Circle(), self.plan, self.epoch_ns, [self.port], self.settings)
+        return emulated.in_thread(receiver.run, truth=self.truth)
 
     def driver(self):
         return emulated.in_thread(self.sensor.run, self.recorded.append)
+
+    def solved(self):
+        """Epochs so far, sent or not."""
+        return len(self.truth.read_text().splitlines())
 
     def of(self, kind):
         return [message for message in self.recorded if isinstance(message, kind)]
@@ -60,6 +56,12 @@ class Setup:
     def walk_s(self, fix):
         """When the fix was taken, by its position."""
         return emulated.DATUM.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m)[0]
+
+    def assert_true_to_time(self):
+        """Each fix has the position of its instant, and a stamp no further from it than a busy host's delays."""
+        for fix in self.fixes():
+            assert self.walk_s(fix) == pytest.approx((fix.utc_ns - self.settings.utc_epoch_ns) / 1e9, abs=1e-3)
+            assert self.walk_s(fix) == pytest.approx((fix.stamp_ns - self.epoch_ns) / 1e9, abs=1.0)
 
 
 @pytest.mark.parametrize("tcp", [False, True], ids=["pty", "tcp"])
@@ -86,24 +88,29 @@ def test_every_epoch_arrives_at_its_instant(tmp_path, tcp):
 
 @pytest.mark.parametrize("tcp", [False, True], ids=["pty", "tcp"])
 def test_a_link_that_vanishes_is_taken_up_again(tmp_path, tcp):
-    setup = Setup(tmp_path, tcp, ["disconnect@1+0.7"])
+    setup = Setup(tmp_path, tcp)
     with setup.emulator(), setup.driver():
-        wait_for(setup.fixes)
+        wait_for(lambda: len(setup.fixes()) >= 3)
+        setup.plan.begin("reach:disconnect")
         wait_for(lambda: setup.sensor.health().state is SensorState.SEARCHING)
-        lost_s = max(map(setup.walk_s, setup.fixes()))
-        wait_for(lambda: setup.walk_s(setup.fixes()[-1]) > lost_s + 1.0)
+        solved = setup.solved()
+        wait_for(lambda: setup.solved() >= solved + 6)
+        count = len(setup.fixes())
+        setup.plan.end()
+        wait_for(lambda: len(setup.fixes()) > count)
     assert "receiving from" in setup.of(SensorEvent)[-1].text
     assert setup.sensor.health().streams[0].lost >= 5
 
 
 def test_a_reboot_is_survived_without_a_false_fix(tmp_path):
-    setup = Setup(tmp_path, faults=["reboot@1"])
+    setup = Setup(tmp_path)
     with setup.emulator(), setup.driver():
+        wait_for(setup.fixes)
+        setup.plan.begin("reach:reboot")
         wait_for(lambda: any(fix.quality is FixQuality.INVALID for fix in setup.of(GnssFix)))
         count = len(setup.fixes())
         wait_for(lambda: len(setup.fixes()) > count + 3)
-    for fix in setup.fixes():
-        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=1.0)
+    setup.assert_true_to_time()
 
 
 def test_garbage_and_damage_cost_sentences_and_never_make_false_ones(tmp_path):
@@ -112,15 +119,16 @@ def test_garbage_and_damage_cost_sentences_and_never_make_false_ones(tmp_path):
         wait_for(lambda: len(setup.fixes()) >= 25)
     for message in setup.of(NmeaSentence):
         assert nmea_oracle.valid_sentences(message.sentence.encode() + b"\r\n") == [message.sentence]
-    for fix in setup.fixes():
-        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=1.0)
+    setup.assert_true_to_time()
     utc_ns = [fix.utc_ns for fix in setup.fixes()]
     assert utc_ns == sorted(set(utc_ns))
 
 
 def test_a_clock_step_becomes_an_event_and_the_stamps_stay(tmp_path):
-    setup = Setup(tmp_path, tcp=True, faults=["clock_step=2.5@1"])
+    setup = Setup(tmp_path, tcp=True)
     with setup.emulator(), setup.driver():
+        wait_for(lambda: len(setup.fixes()) >= 3)
+        setup.plan.begin("reach:clock_step=2.5")
         wait_for(lambda: any("stepped by" in event.text for event in setup.of(SensorEvent)))
         count = len(setup.fixes())
         wait_for(lambda: len(setup.fixes()) > count + 10)
@@ -134,16 +142,21 @@ def test_a_clock_step_becomes_an_event_and_the_stamps_stay(tmp_path):
 
 
 def test_many_clients_get_the_same_bytes(tmp_path):
-    setup = Setup(tmp_path, tcp=True)
+    setup = Setup(tmp_path, tcp=True, rate_hz=20.0)
+    clients = [socket.create_connection(setup.port.address, PATIENCE_S) for _ in range(3)]
     with setup.emulator():
-        wait_for(setup.truth.exists)
-        clients = [socket.create_connection(setup.address, 5.0) for _ in range(3)]
-        heard = [b"".join(client.recv(4096) for _ in range(8)) for client in clients]
-        for client in clients:
-            client.close()
-    texts = [nmea_oracle.valid_sentences(data) for data in heard]
-    assert len(texts[0]) >= 8
-    assert len(set(texts[0]) & set(texts[1]) & set(texts[2])) >= 8
+        heard = [received(client, 2000) for client in clients]
+    for client in clients:
+        client.close()
+    assert heard[0] == heard[1] == heard[2]
+    assert len(nmea_oracle.valid_sentences(heard[0])) >= 8
+
+
+def received(client, count):
+    data = b""
+    while len(data) < count:
+        data += client.recv(count - len(data))
+    return data
 
 
 def test_new_year_passes_without_a_gap(tmp_path):
@@ -158,12 +171,16 @@ def test_new_year_passes_without_a_gap(tmp_path):
 
 
 def test_a_receiver_that_falls_silent_is_missed_and_found(tmp_path):
-    setup = Setup(tmp_path, faults=["stall@1+1.2"])
+    setup = Setup(tmp_path)
     with setup.emulator(), setup.driver():
-        seen = []
+        wait_for(lambda: len(setup.fixes()) >= 3)
+        setup.plan.begin("reach:stall")
+        solved, seen = setup.solved(), []
         wait_for(lambda: seen.append(setup.sensor.health()) or "no epoch for" in seen[-1].problem)
         assert seen[-1].state is SensorState.DEGRADED
+        wait_for(lambda: setup.solved() >= solved + 10)
         count = len(setup.fixes())
+        setup.plan.end()
         wait_for(lambda: len(setup.fixes()) > count)
         wait_for(lambda: setup.sensor.health().state is SensorState.OK)
     assert setup.sensor.health().streams[0].lost >= 9

@@ -18,7 +18,7 @@ from drivers.sim.faults import FaultPlan, parse
 from drivers.sim.gopro_device import Hero8, Quirks
 from drivers.sim.gopro_line import BadLine, StreamClock
 from tests.drivers.gopro.rig import STREAM_PORT, emulator, loopback_address
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 CLIP = Path(__file__).parents[3] / "../shared/data/gopro/max-heromode.mp4"
 RESTART = "/gp/gpControl/execute?p1=gpStream&c1=restart"
@@ -111,7 +111,7 @@ def test_datagrams_are_seven_packets_and_the_truth_matches_the_stream(tmp_path):
     demuxer, units = Demuxer(), []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.bind((host, STREAM_PORT))
-        ear.settimeout(3)
+        ear.settimeout(PATIENCE_S)
         Camera(camera._address, camera.http_port, host).preview(start=True)
         while len(units) < 30:
             datagram = ear.recv(2048)

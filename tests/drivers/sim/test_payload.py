@@ -8,7 +8,7 @@ import pytest
 from drivers.errors import SimulationError
 from drivers.registry import config_type
 from drivers.sim.payload import Payload, PayloadConfig
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def address():
 def answers(address):
     """Whether a receiver speaks NMEA there."""
     try:
-        with socket.create_connection(address, timeout=5.0) as link, link.makefile("rb") as lines:
+        with socket.create_connection(address, timeout=PATIENCE_S) as link, link.makefile("rb") as lines:
             return lines.readline().startswith(b"$GN")
     except ConnectionError:
         return False

@@ -46,7 +46,7 @@ def recorder(tmp_path):
 
 
 def subscribed(recorder, kind) -> None:
-    wait_for(lambda: recorder.bus._wants(kind), 5.0)
+    wait_for(lambda: recorder.bus._wants(kind))
 
 
 def received(client, count: int) -> list[Envelope]:
@@ -56,7 +56,7 @@ def received(client, count: int) -> list[Envelope]:
         found.extend(client.receive(0.05))
         return len(found) >= count
 
-    wait_for(enough, 5.0)
+    wait_for(enough)
     return found
 
 
@@ -103,7 +103,7 @@ def test_what_a_slow_pipeline_misses_is_counted(recorder, tmp_path):
             known = client._last.get(CONFIG.topics.imu, 0)
             return known >= total
 
-        wait_for(last, 10.0)
+        wait_for(last)
         assert got < total
         assert client.lost[CONFIG.topics.imu] + got == client._last[CONFIG.topics.imu] - first(client, got)
 
@@ -119,7 +119,7 @@ def test_results_come_back_to_be_recorded_and_shown(recorder, tmp_path):
     with BusClient(tmp_path, []) as client:
         for result in (POSE, turn, placed, FOUND, DETECTING, LOCATION):
             client.send(result)
-        wait_for(lambda: recorder.bus.location is not None, 5.0)
+        wait_for(lambda: recorder.bus.location is not None)
     assert (recorder.bus.location, recorder.bus.detecting) == (LOCATION, DETECTING)
     assert recorder.taken[:2] == [POSE, turn]
     assert isinstance(recorder.taken[2], GnssPose)
@@ -132,7 +132,7 @@ def test_the_pipeline_finds_a_recorder_that_starts_later_and_one_that_comes_back
             recorder = Recorder(tmp_path)
             recorder.bus.start()
             # ZeroMQ subscribes again only when the client looks.
-            wait_for(lambda bus=recorder.bus: not list(client.receive(0.0)) and bus._wants(ImuSample), 10.0)
+            wait_for(lambda bus=recorder.bus: not list(client.receive(0.0)) and bus._wants(ImuSample))
             recorder.bus.offer(scene.imu(1))
             assert received(client, 1)[0].stamp_ns == 1
             recorder.bus.stop()

@@ -11,6 +11,7 @@ import pytest
 
 from edge.cli import exit_codes, tui
 from edge.errors import UsageError
+from tests.waiting import PATIENCE_S
 
 
 def arguments(*words):
@@ -63,7 +64,7 @@ def test_the_command_table_and_the_service_never_load_textual():
         "[importlib.import_module(m.name) for m in pkgutil.iter_modules(edge.service.__path__, 'edge.service.')];"
         "print([name for name in ('textual', 'ui') if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
@@ -78,6 +79,6 @@ def test_a_screen_whose_terminal_hung_up_ends(tmp_path):
             shown += os.read(master, 65536)
         os.close(master)
         try:
-            assert screen.wait(timeout=90) is not None
+            assert screen.wait(PATIENCE_S) is not None
         finally:
             screen.kill()

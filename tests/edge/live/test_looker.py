@@ -181,12 +181,12 @@ def test_its_thread_looks_at_a_lower_priority_and_ends_when_told_to(model):
     live = LiveDetection(Config(detection=Detection(model=str(model))), lambda topics: bus)
     assert live.state.state == "starting"
     live.start(stop)
-    wait_for(lambda: live.state.state == "watching", 20.0)
+    wait_for(lambda: live.state.state == "watching")
     thread = next(one for one in threading.enumerate() if one.name == "detection")
     own = os.getpriority(os.PRIO_PROCESS, 0)
     assert os.getpriority(os.PRIO_PROCESS, thread.native_id) == min(19, own + module.NICER)
     bus.waiting.append(envelope(*videos.units(1)[0]))
-    wait_for(lambda: bus.sent, 10.0)
+    wait_for(lambda: bus.sent)
     stop.set()
     live.join()
     assert not thread.is_alive()
@@ -197,6 +197,6 @@ def test_a_wrong_model_fails_in_words_and_alone(tmp_path):
     junk.write_bytes(b"")
     live = LiveDetection(Config(detection=Detection(model=str(junk))), lambda topics: Bus())
     live.start(threading.Event())
-    wait_for(lambda: live.state.state == "failed", 20.0)
+    wait_for(lambda: live.state.state == "failed")
     assert "junk.onnx" in live.state.note
     live.join()

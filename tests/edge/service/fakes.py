@@ -10,6 +10,7 @@ from drivers.messages import ImuSample, Message
 from edge.config import Config, Control, Recording
 from edge.control.client import ControlClient
 from edge.service.service import Service
+from tests.waiting import PATIENCE_S
 
 
 def imu(host_ns: int) -> ImuSample:
@@ -71,11 +72,11 @@ def running(service: Service, socket_path: Path) -> Iterator[ControlClient]:
 
     service._start = start  # type: ignore[method-assign]
     thread.start()
-    assert service_started.wait(10)
+    assert service_started.wait(PATIENCE_S)
     try:
         with ControlClient(socket_path) as client:
             yield client
     finally:
         stop.set()
-        thread.join(20)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()

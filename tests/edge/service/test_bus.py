@@ -11,7 +11,7 @@ from edge.service.judge import Judge
 from edge.service.service import Service
 from edge.service.supervisor import Plan
 from tests.edge.service.fakes import FakeDriver, config, imu, running
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 LOCATION = Location("tracking", 12.5, 1.2, 0.3, (1.0, 2.0, 3.0), True, 4, 0.5, 0.1)
 DETECTING = Detecting("watching", "ailanthus", "ab12", "cpu", 2.0, 180.0, 3, 40, 560)
@@ -25,7 +25,7 @@ def test_the_pipeline_hears_the_sensors_and_its_poses_are_in_the_file(tmp_path: 
         running(service, tmp_path / "control.sock") as recorder,
         BusClient(tmp_path, [settings.topics.imu]) as pipeline,
     ):
-        assert driver.running.wait(10)
+        assert driver.running.wait(PATIENCE_S)
         assert recorder.status().location is None
         heard: list[int] = []
 
@@ -35,13 +35,13 @@ def test_the_pipeline_hears_the_sensors_and_its_poses_are_in_the_file(tmp_path: 
             heard.extend(one.stamp_ns for one in pipeline.receive(0.05))
             return 7 in heard
 
-        wait_for(hears, 10.0)
+        wait_for(hears)
         folder = Path(recorder.request(Request("start")).folder)
         pipeline.send(POSE)
         pipeline.send(Detections(5, 6, ()))
         pipeline.send(DETECTING)
         pipeline.send(LOCATION)
-        wait_for(lambda: recorder.status().location == LOCATION, 10.0)
+        wait_for(lambda: recorder.status().location == LOCATION)
         assert recorder.status().detecting == DETECTING
         recorder.request(Request("stop"))
     with next(folder.glob("*.mcap")).open("rb") as file:

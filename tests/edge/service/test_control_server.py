@@ -18,7 +18,7 @@ from edge.control.codec import REQUEST_LIMIT
 from edge.control.messages import Host, Reply, Request, Status
 from edge.errors import ControlError
 from edge.service.control_server import CLIENT_LIMIT, ControlServer
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 HOST = Host(
     cpu_percent=1.0,
@@ -49,7 +49,7 @@ class FakeCommands:
     def handle(self, request: Request, receive_ns: int) -> Reply:
         self.requests.append(request)
         if request.command == "stop":
-            assert self.hold.wait(10)
+            assert self.hold.wait(PATIENCE_S)
         if request.command == "validate":
             raise ControlError("nothing to validate") if request.session else ZeroDivisionError
         if request.command == "mark" and not request.text:
@@ -87,7 +87,7 @@ def client(server: ControlServer, path: Path) -> Iterator[ControlClient]:
 
 def raw(path: Path) -> socket.socket:
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    connection.settimeout(10)
+    connection.settimeout(PATIENCE_S)
     connection.connect(str(path))
     return connection
 
@@ -177,7 +177,7 @@ def test_a_recorder_of_another_version_is_named(tmp_path: Path) -> None:
         thread.start()
         with pytest.raises(ControlError, match=r"mapforest 9.* speaks version 2 .* restart the recorder"):
             ControlClient(path).connect()
-        thread.join(10)
+        thread.join(PATIENCE_S)
 
 
 def test_no_recorder_no_permission_and_a_silent_one_are_told_apart(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from drivers.messages import LidarScan
 from edge.config import Config, Live
 from edge.service.live import LiveView
 from tests.edge.service.fakes import imu
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 foxglove = pytest.importorskip("foxglove")
 
@@ -28,7 +28,7 @@ class Viewer:
     """Enough of RFC 6455 and of foxglove.sdk.v1 to subscribe and to read."""
 
     def __init__(self, port: int) -> None:
-        self._socket = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
         self._socket.sendall(
             b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
             b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"

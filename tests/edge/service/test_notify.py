@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from edge.service.notify import Notifier
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture
 def systemd(tmp_path: Path) -> Iterator[socket.socket]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind(str(tmp_path / "notify"))
-        listening.settimeout(5)
+        listening.settimeout(PATIENCE_S)
         yield listening
 
 
@@ -35,7 +36,7 @@ def test_an_abstract_socket_is_understood() -> None:
     name = f"mapforest-test-{os.getpid()}"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind("\0" + name)
-        listening.settimeout(5)
+        listening.settimeout(PATIENCE_S)
         notifier = Notifier({"NOTIFY_SOCKET": "@" + name})
         notifier.ready()
         assert listening.recv(100) == b"READY=1"

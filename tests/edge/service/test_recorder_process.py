@@ -16,7 +16,7 @@ from edge.cli import exit_codes
 from edge.cli.main import main
 from edge.control.client import ControlClient
 from edge.errors import ControlError
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 ROOT = Path(__file__).parents[3]
 
@@ -40,7 +40,7 @@ def config_path(tmp_path: Path) -> Path:
 def systemd(tmp_path: Path) -> Iterator[socket.socket]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind(str(tmp_path / "notify"))
-        listening.settimeout(30)
+        listening.settimeout(PATIENCE_S)
         yield listening
 
 
@@ -77,7 +77,7 @@ def test_a_signal_during_a_recording_leaves_a_finished_session(
     code, status = command_line(capsys, config_path, "status")
     assert status["recording"]["session"] == started["session"]
     recorder.send_signal(number)
-    assert recorder.wait(30) == 0
+    assert recorder.wait(PATIENCE_S) == 0
     folder = Path(started["folder"])
     (split,) = folder.glob("*.mcap")
     with split.open("rb") as file:
@@ -98,7 +98,7 @@ def test_a_stop_on_the_command_line_brings_a_verdict(
     code, stopped = command_line(capsys, config_path, "stop")
     assert code == exit_codes.GOOD
     with ControlClient(config_path.parent / "control.sock") as client:
-        wait_for(lambda: (verdict := client.status().verdict) and not verdict.running, timeout_s=40)
+        wait_for(lambda: (verdict := client.status().verdict) and not verdict.running)
         verdict = client.status().verdict
     assert verdict is not None
     assert verdict.session == stopped["session"]
@@ -127,7 +127,7 @@ def test_a_killed_recorder_leaves_a_socket_that_stops_nobody(
     recorder: subprocess.Popen[bytes], config_path: Path
 ) -> None:
     recorder.kill()
-    recorder.wait(10)
+    recorder.wait(PATIENCE_S)
     path = config_path.parent / "control.sock"
     assert path.exists()
     with pytest.raises(ControlError, match="not running"):

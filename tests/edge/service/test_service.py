@@ -20,7 +20,7 @@ from edge.service.notify import Notifier
 from edge.service.service import Service
 from edge.service.supervisor import Plan
 from tests.edge.service.fakes import FakeDriver, config, imu, running
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 VERDICT = 'import json; print(json.dumps({"verdict": "WARN", "reasons": ["no scan"]}))'
 FIX = GnssFix(
@@ -72,7 +72,7 @@ def service(tmp_path: Path, driver: FakeDriver, notifier: FakeNotifier) -> Servi
 @pytest.fixture
 def client(service: Service, driver: FakeDriver, tmp_path: Path) -> Iterator[ControlClient]:
     with running(service, tmp_path / "control.sock") as connected:
-        assert driver.running.wait(10)
+        assert driver.running.wait(PATIENCE_S)
         yield connected
 
 
@@ -190,7 +190,7 @@ def test_the_watchdog_is_not_fed_when_all_receivers_stand_still(service: Service
     driver.expected_hz = 200.0
     health = service._health
     service._supervisor.start()
-    assert driver.running.wait(10)
+    assert driver.running.wait(PATIENCE_S)
     health.look(10**18)
     assert health.alive
     status = health.status(10**18)
