@@ -78,6 +78,7 @@ class Receiver:
         self._filled: deque[Block] = deque()
         self._block = self._free.pop()
         self._arrived = Event()
+        self._opened = Event()
         self._address = ""
         self.foreign = 0
         """Datagrams from somebody else."""
@@ -102,6 +103,7 @@ class Receiver:
             ) from error
         self._sources = [*self._sources, *opened]
         self._hosts.add(host)
+        self._opened.set()
 
     def accept_from(self, address: str) -> None:
         """Take datagrams of this LiDAR only."""
@@ -149,7 +151,7 @@ class Receiver:
     def _turn(self, stop: Event) -> None:
         sources = self._sources
         if not sources:
-            stop.wait(POLL_S)
+            self._opened.wait(POLL_S)  # at once: the kernel stamps only from a moment after the first socket is open
             return
         if len(self._block) < BLOCK_SLOTS:
             poll = select.poll()

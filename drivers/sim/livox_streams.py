@@ -48,6 +48,8 @@ class PointStream:
         self._next = 0
         self.count = 0
         self.skipped = 0
+        self.latest_ns = 0
+        """The longest that a packet had to wait for its block, or for this process to get its turn."""
 
     def end(self) -> None:
         """Pause. Packets that were not sent were never made."""
@@ -74,6 +76,7 @@ class PointStream:
             if end_ticks > ticks_ns:
                 return
             self._ready.popleft()
+            self.latest_ns = max(self.latest_ns, ticks_ns - end_ticks)
             stamp_ns = self._oscillator.stamp_ns(end_ticks - LAST_POINT_NS)
             packet[TIMESTAMP] = stamp_ns.to_bytes(8, "little")  # now: a clock step meets points and IMU together
             yield packet

@@ -13,9 +13,10 @@ import numpy as np
 from drivers.gopro.config import Config
 from drivers.gopro.driver import Sensor
 from drivers.messages import SensorEvent, VideoFrame
-from drivers.sim.faults import FaultPlan, parse
+from drivers.sim.faults import parse
 from drivers.sim.gopro_device import Quirks
 from drivers.sim.gopro_emulator import Emulator
+from tests.drivers.switched import SwitchedPlan
 from tests.waiting import PATIENCE_S
 
 _numbers = itertools.count(random.SystemRandom().randrange(1, 1 << 22))
@@ -58,7 +59,7 @@ class TinySource:
 
 
 def emulator(*faults: str, quirks: Quirks | None = None, source=None, truth=None, address=None, port=0) -> Emulator:
-    plan = FaultPlan("gopro", [parse(fault) for fault in faults])
+    plan = SwitchedPlan("gopro", [parse(fault) for fault in faults])
     epoch_ns = time.monotonic_ns()
     return Emulator(
         source or TinySource(), plan, epoch_ns, address or loopback_address(), port, STREAM_PORT, truth, quirks
@@ -98,6 +99,7 @@ class Running:
 
 
 def config(address: str, http_port: int, **changes) -> Config:
-    """Of a driver on its own loopback address, impatient."""
-    values = {"host": loopback_address(), "timeout_s": 1.0, "retry_s": 0.2, "poll_s": 0.5, "stall_s": 0.6, **changes}
+    """Of a driver on its own loopback address, quick to look again, and patient with a busy machine."""
+    patient = {"timeout_s": PATIENCE_S, "stall_s": PATIENCE_S}
+    values = {"host": loopback_address(), "retry_s": 0.2, "poll_s": 0.5, **patient, **changes}
     return Config(address=address, http_port=http_port, stream_port=STREAM_PORT, **values)

@@ -64,7 +64,7 @@ class FfmpegCamera:
 def test_the_real_clip_remuxed_by_ffmpeg_arrives_byte_for_byte():
     stream = remuxed_clip()
     expected = ffmpeg_packets(stream)
-    quiet = {"set_clock": False, "settings": {}, "record_on_camera": False, "stall_s": 60.0}
+    quiet = {"set_clock": False, "settings": {}, "record_on_camera": False}
     with FfmpegCamera(stream) as camera, Running(config(camera.address, camera.server.server_port, **quiet)) as driver:
         wait_for(lambda: len(driver.frames) == len(expected))
         assert [(frame.data, frame.pts_90khz) for frame in driver.frames] == expected

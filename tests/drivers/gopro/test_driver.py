@@ -47,7 +47,9 @@ def test_wifi_streams_every_access_unit_byte_for_byte_from_a_keyframe_on():
         frames = list(driver.frames)
         assert frames[0].keyframe
         assert consecutive(frames)
-        assert all(0 <= frame.receive_ns - frame.stamp_ns + 50_000_000 < 300_000_000 for frame in frames)
+        ways_ns = [frame.receive_ns - round(frame.pts_90khz / 90e3 * 1e9) for frame in frames]
+        late_ns = max(ways_ns) - min(ways_ns)  # little, and whatever a busy machine adds
+        assert all(0 <= frame.receive_ns - frame.stamp_ns + late_ns < 200_000_000 + 2 * late_ns for frame in frames)
         wait_for(lambda: driver.sensor.health().state is not SensorState.STARTING)
         health = driver.sensor.health()
         assert health.battery_percent is not None
@@ -105,14 +107,16 @@ def test_usb_asks_again_when_the_first_start_does_nothing(monkeypatch):
 
 
 def test_kept_alive_the_picture_never_freezes(monkeypatch):
-    monkeypatch.setattr("drivers.gopro.keepalive.INTERVAL_S", 0.3)
-    with camera(quirks=Quirks(frozen_after_s=0.6)) as emulated, Running(of(emulated, stall_s=60.0)) as driver:
-        wait_for(lambda: len(driver.frames) > 60)
+    monkeypatch.setattr("drivers.gopro.keepalive.INTERVAL_S", 0.05)
+    with camera(quirks=Quirks(frozen_after_s=1.0)) as emulated, Running(of(emulated)) as driver:
+        wait_for(lambda: len(driver.frames) > 45)
         assert consecutive(list(driver.frames))
 
 
 def test_a_silent_stream_is_started_again_and_then_the_operator_is_told_where_to_look():
-    with camera("gopro:stall@1.5") as emulated, Running(of(emulated)) as driver:
+    with camera() as emulated, Running(of(emulated, stall_s=0.6)) as driver:
+        wait_for(lambda: driver.frames)
+        emulated._plan.begin("gopro:stall")
         wait_for(lambda: driver.told("camera stream is silent"))
         wait_for(lambda: f"nothing arrives on UDP port {STREAM_PORT}" in driver.sensor.health().problem)
         health = driver.sensor.health()
@@ -121,9 +125,12 @@ def test_a_silent_stream_is_started_again_and_then_the_operator_is_told_where_to
 
 
 def test_the_camera_goes_away_and_comes_back():
-    with camera("gopro:disconnect@1.5+1.5") as emulated, Running(of(emulated)) as driver:
+    with camera() as emulated, Running(of(emulated, stall_s=0.6)) as driver:
+        wait_for(lambda: driver.frames)
+        emulated._plan.begin("gopro:disconnect")
         wait_for(lambda: driver.told("camera lost"))
-        assert driver.sensor.health().state is SensorState.SEARCHING
+        wait_for(lambda: driver.sensor.health().state is SensorState.SEARCHING)
+        emulated._plan.end()
         wait_for(lambda: len([e for e in driver.events if "camera found" in e.text]) == 2)
         before = len(driver.frames)
         wait_for(lambda: len(driver.frames) > before + 10)
@@ -132,9 +139,10 @@ def test_the_camera_goes_away_and_comes_back():
 def test_a_reboot_begins_a_new_clock_and_the_recording_starts_again(monkeypatch):
     monkeypatch.setattr("drivers.sim.gopro_device.BOOT_S", 0.8)
     monkeypatch.setattr("drivers.sim.gopro_device.READY_S", 0.2)
-    with camera("gopro:reboot@2") as emulated, Running(of(emulated)) as driver:
+    with camera() as emulated, Running(of(emulated, stall_s=0.6)) as driver:
         driver.sensor.session_started()
-        wait_for(lambda: emulated.device.recording)
+        wait_for(lambda: emulated.device.recording and driver.frames)
+        emulated._plan.begin("gopro:reboot")
         wait_for(lambda: driver.told("stream clock began anew"))
         wait_for(lambda: len([e for e in driver.events if "recording started" in e.text]) == 2)
         clock = driver.sensor.health().clock
@@ -196,10 +204,13 @@ def test_a_dead_stream_thread_turns_red_and_is_started_again(monkeypatch):
         wait_for(lambda: len(driver.frames) > before + 5)
 
 
-@pytest.mark.parametrize("fault", ["gopro:duplicate=0.3", "gopro:reorder=0.2", "gopro:garbage=40"])
-def test_copies_swaps_and_rubbish_cost_nothing(fault):
-    with camera(fault) as emulated, Running(of(emulated)) as driver:
-        wait_for(lambda: len(driver.frames) > 40)
+def test_copies_swaps_and_rubbish_cost_nothing():
+    with camera() as emulated, Running(of(emulated)) as driver:
+        for fault in ("gopro:duplicate=0.3", "gopro:reorder=0.2", "gopro:garbage=40"):
+            before = len(driver.frames)
+            emulated._plan.begin(fault)
+            wait_for(lambda before=before: len(driver.frames) > before + 20)
+            emulated._plan.end()
         assert consecutive(list(driver.frames))
         assert driver.sensor.health().streams[0].lost == 0
 

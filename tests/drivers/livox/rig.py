@@ -13,10 +13,11 @@ from drivers.driver import SensorHealth
 from drivers.livox.config import Config
 from drivers.livox.driver import Sensor
 from drivers.messages import ImuSample, LidarScan, Message, SensorEvent
-from drivers.sim.faults import FaultPlan, parse
+from drivers.sim.faults import parse
 from drivers.sim.livox_device import DeviceOptions
 from drivers.sim.livox_emulator import BROADCAST, Emulator
 from drivers.sim.sources import PointBlock
+from tests.drivers.switched import SwitchedPlan
 from tests.waiting import PATIENCE_S, wait_for
 
 
@@ -39,6 +40,7 @@ class Rig:
 
     sensor: Sensor
     emulator: Emulator
+    plan: SwitchedPlan
     messages: list[Message] = field(default_factory=list)
 
     def of(self, kind: type) -> list[Message]:
@@ -59,6 +61,15 @@ class Rig:
     def health(self) -> SensorHealth:
         return self.sensor.health()
 
+    def truth_ns(self, sample: ImuSample) -> int:
+        """When the sample was taken, by its yaw rate."""
+        return self.emulator._epoch_ns + round(sample.angular_velocity[2] * 1e9)
+
+    def lateness_ns(self) -> int:
+        """Bound of the time from a measurement to its arrival: milliseconds, and whatever a busy machine adds."""
+        underway_ns = max(sample.receive_ns - self.truth_ns(sample) for sample in self.samples)
+        return underway_ns + self.emulator._point_stream.latest_ns
+
 
 def addresses() -> tuple[str, str]:
     """Two loopback addresses, LiDAR and host, that no other test uses."""
@@ -73,13 +84,12 @@ def serial() -> str:
 
 
 @contextlib.contextmanager
-def emulated(*faults: str, ready_s: float = 0.0, **device) -> Iterator[tuple[Emulator, str, str]]:
-    """An emulator that runs in a thread; faults count from `ready_s` after now. Start-up is 20 times faster."""
+def emulated(*faults: str, **device) -> Iterator[tuple[Emulator, str, str]]:
+    """An emulator that runs in a thread. Start-up is 20 times faster."""
     lidar, host = addresses()
-    plan = FaultPlan("livox", [parse(fault) for fault in faults])
+    plan = SwitchedPlan("livox", [parse(fault) for fault in faults])
     options = DeviceOptions(**{"time_scale": 0.05, "serial": serial()} | device)
-    epoch_ns = time.monotonic_ns() + round(ready_s * 1e9)
-    emulator = Emulator(Ramp(), Ramp(), plan, epoch_ns, address=lidar, options=options)
+    emulator = Emulator(Ramp(), Ramp(), plan, time.monotonic_ns(), address=lidar, options=options)
     stop, bound = threading.Event(), threading.Event()
     thread = threading.Thread(target=emulator.run, args=(stop, None, bound.set))
     thread.start()
@@ -94,7 +104,7 @@ def emulated(*faults: str, ready_s: float = 0.0, **device) -> Iterator[tuple[Emu
 @contextlib.contextmanager
 def driving(emulator: Emulator, config: Config) -> Iterator[Rig]:
     """The driver in a thread."""
-    rig = Rig(Sensor("livox", config), emulator)
+    rig = Rig(Sensor("livox", config), emulator, emulator._plan)
     stop = threading.Event()
     thread = threading.Thread(target=rig.sensor.run, args=(rig.messages.append, stop))
     thread.start()

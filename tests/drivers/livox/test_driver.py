@@ -14,6 +14,12 @@ from tests.drivers.livox.rig import driving, emulated, quick, running, streaming
 from tests.waiting import wait_for
 
 
+@pytest.fixture(autouse=True)
+def _no_packet_is_skipped(monkeypatch):
+    """On a busy machine the emulated LiDAR falls behind, and leaves nothing out."""
+    monkeypatch.setattr("drivers.sim.livox_streams.HOPELESS_NS", 10**12)
+
+
 def test_streams_scans_and_inertial_samples():
     with running() as rig:
         streaming(rig, 6)
@@ -67,15 +73,16 @@ def test_polite_stop_leaves_the_lidar_idle():
 
 
 def test_losses_are_exactly_those_injected():
-    with running("livox:loss=0.05@0.5+1.0", "livox:duplicate=0.05@0.5+1.0", "livox:reorder=0.05@0.5+1.0") as rig:
-        wait_for(lambda: rig.scans)
-        first_ns = rig.scans[0].stamp_ns
-        wait_for(lambda: rig.scans[-1].stamp_ns - first_ns > 1.6e9)
-        streaming(rig, 2)
+    with running() as rig:
+        streaming(rig)
+        for fault in ("livox:loss=0.05", "livox:duplicate=0.05", "livox:reorder=0.05"):
+            rig.plan.begin(fault)
+        wait_for(lambda: rig.emulator.points.tally.lost > 50 and rig.emulator.imu.tally.lost > 5)
+        rig.plan.end()
+        streaming(rig)
         streams = rig.health().streams
         details = rig.health().details
         points, imu = rig.emulator.points.tally, rig.emulator.imu.tally
-    assert points.lost > 20
     assert (streams[0].lost, streams[1].lost) == (points.lost, imu.lost)
     assert int(details["duplicate packets"]) == points.duplicated + imu.duplicated
     assert int(details["late packets"]) > 0
@@ -100,7 +107,9 @@ def test_nobody_there():
 
 
 def test_reboot_is_noticed_and_survived():
-    with running("livox:reboot@1.0") as rig:
+    with running() as rig:
+        streaming(rig, 2)
+        rig.plan.begin("livox:reboot")
         wait_for(lambda: "the LiDAR started anew" in rig.events)
         streaming(rig, 4)
         health = rig.health()
@@ -115,33 +124,40 @@ def test_reboot_is_noticed_and_survived():
 
 @pytest.mark.parametrize("step_s", [2.5, -3.0])
 def test_clock_step_is_an_event_and_no_loss(step_s):
-    with running(f"livox:clock_step={step_s}@1.0") as rig:
+    with running() as rig:
+        streaming(rig, 2)
+        rig.plan.begin(f"livox:clock_step={step_s}")
         wait_for(lambda: any("jumped" in text for text in rig.events))
         streaming(rig, 5)
         health = rig.health()
     (event,) = [text for text in rig.events if "jumped" in text]
-    assert float(event.split()[-2]) == pytest.approx(step_s, abs=0.4)
+    late_ns = rig.lateness_ns() + 5_000_000
+    assert float(event.split()[-2]) == pytest.approx(step_s, abs=late_ns / 1e9)
     assert [stream.lost for stream in health.streams] == [0, 0]
+    for sample in rig.samples:  # stamps stay those of the host
+        assert abs(sample.stamp_ns - rig.truth_ns(sample)) < late_ns
     for scan in rig.scans:
-        assert 0 < scan.receive_ns - scan.stamp_ns < 0.2e9  # stamps stay those of the host
-    for sample in rig.samples:
-        assert abs(sample.receive_ns - sample.stamp_ns) < 0.05e9
+        assert abs(scan.receive_ns - scan.stamp_ns) < 0.1e9 + late_ns
 
 
 def test_stall_is_seen_and_the_stream_picked_up_again():
-    with running("livox:stall@0.6+1.9") as rig:
-        wait_for(lambda: rig.scans)
-        wait_for(lambda: rig.health().state is not SensorState.OK)
+    with running() as rig:
+        streaming(rig, 2)
+        rig.plan.begin("livox:stall")
         wait_for(lambda: rig.health().state is SensorState.SEARCHING)
+        rig.plan.end()
         streaming(rig, 5)
         wait_for(lambda: rig.health().state is SensorState.OK)
         assert [stream.lost for stream in rig.health().streams] == [0, 0]
 
 
 def test_pulled_cable_loses_what_was_sent_meanwhile_and_no_more():
-    with running("livox:disconnect@0.6+1.9") as rig:
-        wait_for(lambda: rig.health().state is SensorState.SEARCHING and rig.scans)
+    with running() as rig:
+        streaming(rig, 2)
+        rig.plan.begin("livox:disconnect")
+        wait_for(lambda: rig.health().state is SensorState.SEARCHING)
         wait_for(lambda: rig.emulator.points.tally.lost > 3000)
+        rig.plan.end()
         streaming(rig, 5)
         streams = rig.health().streams
         points, imu = rig.emulator.points.tally, rig.emulator.imu.tally

@@ -57,11 +57,20 @@ class Setup:
         """When the fix was taken, by its position."""
         return emulated.DATUM.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m)[0]
 
+    def lateness_s(self):
+        """The longest way of a fix to the driver: a tenth of a second, and whatever a busy machine adds."""
+        return max((fix.receive_ns - self.epoch_ns) / 1e9 - self.walk_s(fix) for fix in self.fixes())
+
     def assert_true_to_time(self):
-        """Each fix has the position of its instant, and a stamp no further from it than a busy host's delays."""
+        """Each fix has the position of its instant, and a stamp no further from it than the way of a fix."""
         for fix in self.fixes():
             assert self.walk_s(fix) == pytest.approx((fix.utc_ns - self.settings.utc_epoch_ns) / 1e9, abs=1e-3)
-            assert self.walk_s(fix) == pytest.approx((fix.stamp_ns - self.epoch_ns) / 1e9, abs=1.0)
+        self.assert_stamped_in_time()
+
+    def assert_stamped_in_time(self):
+        late_s = self.lateness_s() + 5e-3
+        for fix in self.fixes():
+            assert self.walk_s(fix) == pytest.approx((fix.stamp_ns - self.epoch_ns) / 1e9, abs=late_s)
 
 
 @pytest.mark.parametrize("tcp", [False, True], ids=["pty", "tcp"])
@@ -73,9 +82,9 @@ def test_every_epoch_arrives_at_its_instant(tmp_path, tcp):
     fixes = setup.fixes()
     assert [b.utc_ns - a.utc_ns for a, b in pairwise(fixes)] == [100_000_000] * (len(fixes) - 1)
     truth = {line["sensor_ns"]: line["host_ns"] for line in map(json.loads, setup.truth.read_text().splitlines())}
+    setup.assert_true_to_time()
     for fix in fixes[1:-1]:  # the link was opened and closed in the midst of the others
         assert truth[fix.utc_ns] / 1e9 == pytest.approx(setup.epoch_ns / 1e9 + setup.walk_s(fix), abs=1e-3)
-        assert 0 <= fix.stamp_ns - truth[fix.utc_ns] < 1_000_000_000
         assert fix.quality is FixQuality.RTK_FIXED
         assert (fix.satellites, fix.age_s, fix.sigma_enu_m) == (20, 1.2, (0.011, 0.012, 0.02))
         assert fix.sigma_source.startswith("gst")
@@ -134,11 +143,10 @@ def test_a_clock_step_becomes_an_event_and_the_stamps_stay(tmp_path):
         wait_for(lambda: len(setup.fixes()) > count + 10)
         health = setup.sensor.health()
     (event,) = [event for event in setup.of(SensorEvent) if "stepped" in event.text]
-    assert float(event.text.split(" by ")[1].split()[0]) == pytest.approx(2.5, abs=0.4)
+    assert float(event.text.split(" by ")[1].split()[0]) == pytest.approx(2.5, abs=setup.lateness_s() + 5e-3)
     assert health.clock is not None
     assert health.clock.steps == 1
-    for fix in setup.fixes():
-        assert setup.walk_s(fix) == pytest.approx((fix.stamp_ns - setup.epoch_ns) / 1e9, abs=1.0)
+    setup.assert_stamped_in_time()
 
 
 def test_many_clients_get_the_same_bytes(tmp_path):
