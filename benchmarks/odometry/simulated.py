@@ -51,7 +51,7 @@ class Walk:
                 yield LidarScan(
                     stamp,
                     stamp + SCAN_NS,
-                    np.ascontiguousarray(part["xyz_mm"] * np.float32(1e-3)),
+                    part["xyz_mm"].astype(np.float32) * np.float32(1e-3),
                     np.ascontiguousarray(part["reflectivity"]),
                     np.ascontiguousarray(part["tag"]),
                     (part["slot"] % 4).astype(np.uint8),

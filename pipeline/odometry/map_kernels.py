@@ -126,7 +126,7 @@ def insert(
     position: Doubles,
     sizes: Doubles,
     sides: int,
-    most: float,
+    most: int,
     scan: int,
 ) -> None:
     """Merges clusters (m, 12) of `base_link` into the voxels of every level, with Chan's update.

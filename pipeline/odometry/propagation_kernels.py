@@ -51,16 +51,19 @@ def propagate(
 
         half = rotation @ exp(0.5 * rate * dt)
         lean = -half @ hat(force) * dt
-        f[0:3, 0:3] = turn.T
-        f[0:3, 9:12] = -right_jacobian(rate * dt) * dt
-        f[3:6, 0:3] = 0.5 * dt * lean
-        f[6:9, 0:3] = lean
-        f[6:9, 12:15] = -half * dt
-        f[3:6, 12:15] = -0.5 * dt * dt * half
-        f[6:9, 15:17] = tilt * dt
-        f[3:6, 15:17] = 0.5 * dt * dt * tilt
+        jacobian = right_jacobian(rate * dt)
         for i in range(3):
             f[3 + i, 6 + i] = dt
+            for j in range(3):
+                f[i, j] = turn[j, i]
+                f[i, 9 + j] = -jacobian[i, j] * dt
+                f[3 + i, j] = 0.5 * dt * lean[i, j]
+                f[6 + i, j] = lean[i, j]
+                f[6 + i, 12 + j] = -half[i, j] * dt
+                f[3 + i, 12 + j] = -0.5 * dt * dt * half[i, j]
+            for j in range(2):
+                f[6 + i, 15 + j] = tilt[i, j] * dt
+                f[3 + i, 15 + j] = 0.5 * dt * dt * tilt[i, j]
         p = f @ p @ f.T
         _grow(p, dt, rate, acceleration, imu[k : k + 2], noise)
 
@@ -72,8 +75,10 @@ def propagate(
     out = state.copy()
     # Products of many rotations drift from orthogonal by 1e-16 each: one Gram-Schmidt step keeps it there.
     rotation = 1.5 * rotation - 0.5 * rotation @ rotation.T @ rotation
-    out[:9] = rotation.ravel()
-    out[9:12], out[12:15] = position, velocity
+    for i in range(3):
+        out[9 + i], out[12 + i] = position[i], velocity[i]
+        for j in range(3):
+            out[3 * i + j] = rotation[i, j]
     return out, 0.5 * (p + p.T), knots
 
 
@@ -82,8 +87,9 @@ def _write(
     knot: Doubles, t: float, rotation: Doubles, position: Doubles, velocity: Doubles, accel: Doubles, rate: Doubles
 ) -> None:
     knot[0] = t
-    knot[1:10] = rotation.ravel()
     for i in range(3):
+        for j in range(3):
+            knot[1 + 3 * i + j] = rotation[i, j]
         knot[10 + i], knot[13 + i], knot[16 + i], knot[19 + i] = position[i], velocity[i], accel[i], rate[i]
 
 

@@ -1,4 +1,7 @@
-"""Rotations in three dimensions, compiled: exponential, logarithm and right Jacobians."""
+"""Rotations in three dimensions, compiled: exponential, logarithm and right Jacobians.
+
+Sums are written out here and in the kernels: products of arrays, and arrays put into arrays, take seconds to compile.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +31,15 @@ def cross(a: Doubles, b: Doubles) -> Doubles:
 
 
 @njit(cache=True, nogil=True)
+def norm(v: Doubles) -> float:
+    """Length of v (3,)."""
+    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+@njit(cache=True, nogil=True)
 def exp(v: Doubles) -> Doubles:
     """Rotation (3, 3) of a rotation vector (3,), by Rodrigues."""
-    angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    angle = norm(v)
     k = hat(v)
     if angle < SMALL_RAD:
         return np.eye(3) + k + 0.5 * k @ k
@@ -56,7 +65,7 @@ def log(r: Doubles) -> Doubles:
 @njit(cache=True, nogil=True)
 def right_jacobian(v: Doubles) -> Doubles:
     """Jr (3, 3): Exp(v + d) = Exp(v) Exp(Jr d)."""
-    angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    angle = norm(v)
     k = hat(v)
     if angle < 1e-4:
         return np.eye(3) - 0.5 * k + k @ k / 6.0
@@ -67,7 +76,7 @@ def right_jacobian(v: Doubles) -> Doubles:
 @njit(cache=True, nogil=True)
 def right_jacobian_inverse(v: Doubles) -> Doubles:
     """Inverse of Jr (3, 3)."""
-    angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    angle = norm(v)
     k = hat(v)
     if angle < 1e-4:
         return np.eye(3) + 0.5 * k + k @ k / 12.0
@@ -78,20 +87,22 @@ def right_jacobian_inverse(v: Doubles) -> Doubles:
 @njit(cache=True, nogil=True)
 def across(direction: Doubles) -> Doubles:
     """Two axes (3, 2) across a direction (3,), smooth around straight down."""
-    down = direction / math.sqrt(direction @ direction)
+    down = direction / norm(direction)
     first = np.array([1.0 - down[0] * down[0], -down[0] * down[1], -down[0] * down[2]])
-    first /= math.sqrt(first @ first)
+    first /= norm(first)
+    second = cross(down, first)
     axes = np.empty((3, 2))
-    axes[:, 0], axes[:, 1] = first, cross(down, first)
+    for i in range(3):
+        axes[i, 0], axes[i, 1] = first[i], second[i]
     return axes
 
 
 @njit(cache=True, nogil=True)
 def upright(direction: Doubles) -> Doubles:
     """The shortest rotation (3, 3) that turns a direction (3,) straight up."""
-    up = direction / math.sqrt(direction @ direction)
+    up = direction / norm(direction)
     axis = cross(up, np.array([0.0, 0.0, 1.0]))
-    sine = math.sqrt(axis @ axis)
+    sine = norm(axis)
     if sine < 1e-12:
         return np.eye(3)
     return exp(axis / sine * math.atan2(sine, up[2]))

@@ -50,7 +50,7 @@ def test_a_voxel_holds_the_statistics_of_all_points_in_it():
         intensity.append(bright)
         groups.append(gathered((group - position) @ rotation, bright))
     for scan, row in enumerate(groups):
-        kernels.insert(grid, row[None], rotation, position, SIZES, 4, 1e9, scan)
+        kernels.insert(grid, row[None], rotation, position, SIZES, 4, 10**9, scan)
     points, intensity = np.concatenate(points), np.concatenate(intensity)
     side = kernels.side(1.0, 1.0)
     for level, size in enumerate(SIZES):
@@ -70,7 +70,7 @@ def test_a_voxel_holds_the_statistics_of_all_points_in_it():
 def test_a_full_voxel_keeps_its_shape():
     grid, row = empty(), gathered(np.full((10, 3), 0.25), np.full(10, 7.0))
     for scan in range(3):
-        kernels.insert(grid, row[None], np.eye(3), np.zeros(3), SIZES, 4, 20.0, scan)
+        kernels.insert(grid, row[None], np.eye(3), np.zeros(3), SIZES, 4, 20, scan)
     voxel = found(grid, kernels.pack(0, 0, 0, kernels.side(1.0, 1.0)))
     assert voxel[kernels.COUNT] == 20.0
 
@@ -79,7 +79,7 @@ def test_each_side_of_a_thing_has_a_voxel_of_its_own():
     grid = empty()
     for eye in ([-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [9.0, 9.0, 0.0], [-9.0, 9.0, 0.0]):
         row = gathered(np.array([[0.1, 0.1, 0.1]]) - eye, np.array([1.0]))
-        kernels.insert(grid, row[None], np.eye(3), np.array(eye), SIZES[:1], 4, 100.0, 1)
+        kernels.insert(grid, row[None], np.eye(3), np.array(eye), SIZES[:1], 4, 100, 1)
     assert len(keys(grid)) == 4
     one = empty()
     for eye in ([-9.0, -9.0, 0.0], [9.0, 9.0, 0.0]):

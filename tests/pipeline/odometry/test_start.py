@@ -37,7 +37,7 @@ def tilts_deg(estimates, truth):
     return np.degrees(np.arccos(np.clip((ups * true.rotations[:, 2]).sum(axis=1), -1.0, 1.0)))
 
 
-@pytest.mark.parametrize("begin_s", [7.0, 12.0])
+@pytest.mark.parametrize("begin_s", [7.0, pytest.param(12.0, marks=pytest.mark.slow)])
 def test_a_walk_can_be_joined_on_the_way(streams, begin_s):
     cut, estimates, outcome = follows(streams, begin_s)
     assert len(estimates) > len(cut.scans) - 5
