@@ -20,7 +20,8 @@ from drivers.sim.gopro_emulator import Emulator as Camera
 from drivers.sim.livox_device import DeviceOptions
 from drivers.sim.livox_emulator import Emulator as Lidar
 from drivers.sim.reach_emulator import ReachSettings, Receiver, TcpServer
-from tests.reliability.sources import Eastward, NumberedVideo, Numbers
+from tests.drivers.sources import Eastward
+from tests.reliability.sources import NumberedVideo, Numbers
 
 TRUTH_S = 0.1
 LOOK_S = 0.05

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-import av
 import numpy as np
 
-from drivers.sim.gnss_geodesy import Datum
-from drivers.sim.sources import GnssEpoch, PointBlock
+from drivers.sim.sources import PointBlock
+from tests.drivers.sources import DATUM, tiny_units
 
 POINTS = 96
 RETURNS = 64
@@ -19,7 +16,6 @@ METRES_AN_EPOCH = 0.2
 """The antenna moves east by so much between two epochs at 5 Hz."""
 FILLER = b"\x00\x00\x00\x01\x0c"
 """Start code of a filler NAL unit, in which a frame carries its number."""
-DATUM = Datum()
 
 
 class Numbers:
@@ -41,14 +37,6 @@ class Numbers:
         return (0.0, 0.0, float(self._sample)), (0.0, 0.0, 1.0)
 
 
-class Eastward:
-    """A fixed position that moves east at 1 m/s."""
-
-    def epoch(self, t_ns: int) -> GnssEpoch:
-        latitude, longitude, height = DATUM.geodetic((t_ns / 1e9, 0.0, 0.0))
-        return GnssEpoch(latitude, longitude, height, 48.1, 4, 20, 0.7, 1.2, (0.011, 0.012, 0.02), 1.0, 90.0)
-
-
 def eastings_m(longitudes: np.ndarray) -> np.ndarray:
     """Back from the longitudes; within millimetres for a walk of minutes."""
     east = DATUM.geodetic((100.0, 0.0, 0.0))[1] - DATUM.geodetic((0.0, 0.0, 0.0))[1]
@@ -62,7 +50,7 @@ class NumberedVideo:
         self._base = incarnation * INCARNATION
 
     def access_unit(self, index: int) -> tuple[bytes, bool]:
-        units = _units()
+        units = tiny_units()
         return units[index % len(units)] + FILLER + b"%09d" % (self._base + index) + b"\xff\x80", index % 10 == 0
 
 
@@ -72,31 +60,8 @@ def frame_number(data: bytes) -> int:
     assert len(tail) == 11, tail
     assert tail.endswith(b"\xff\x80"), tail
     number = int(tail[:9])
-    assert unit == _units()[number % INCARNATION % len(_units())], f"frame {number} is not as it was sent"
+    assert unit == tiny_units()[number % INCARNATION % len(tiny_units())], f"frame {number} is not as it was sent"
     return number
-
-
-@cache
-def _units(count: int = 60, size: int = 64) -> tuple[bytes, ...]:
-    codec = av.CodecContext.create("libx264", "w")
-    codec.width = codec.height = size
-    codec.pix_fmt = "yuv420p"
-    codec.framerate = 30
-    codec.gop_size = 10
-    codec.max_b_frames = 0
-    codec.options = {
-        "preset": "ultrafast",
-        "tune": "zerolatency",
-        "x264-params": "repeat-headers=1:scenecut=0:threads=1",
-    }
-    pixels = np.random.default_rng(1)
-    packets = []
-    for index in range(count):
-        image = np.full((size, size, 3), index * 4 % 256, np.uint8)
-        image[: size // 2] = pixels.integers(0, 256, (size // 2, size, 3), np.uint8)
-        packets += codec.encode(av.VideoFrame.from_ndarray(image, "rgb24"))
-    packets += codec.encode(None)
-    return tuple(bytes(packet) for packet in packets)
 
 
 def missing(numbers: np.ndarray) -> int:

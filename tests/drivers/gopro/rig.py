@@ -5,10 +5,6 @@ import random
 import threading
 import time
 from dataclasses import dataclass, field
-from functools import cache
-
-import av
-import numpy as np
 
 from drivers.gopro.config import Config
 from drivers.gopro.driver import Sensor
@@ -16,6 +12,7 @@ from drivers.messages import SensorEvent, VideoFrame
 from drivers.sim.faults import parse
 from drivers.sim.gopro_device import Quirks
 from drivers.sim.gopro_emulator import Emulator
+from tests.drivers.sources import tiny_units
 from tests.drivers.switched import SwitchedPlan
 from tests.waiting import PATIENCE_S
 
@@ -28,26 +25,6 @@ def loopback_address() -> str:
     """127.x.y.z that no other test uses."""
     number = next(_numbers) % (1 << 24 - 2) + 0x10000
     return f"127.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}.{number % 254 + 1}"
-
-
-@cache
-def tiny_units(count: int = 60, size: int = 64, gop: int = 10) -> tuple[bytes, ...]:
-    """H.264 access units in Annex B with parameter sets before each IDR, encoded by PyAV."""
-    codec = av.CodecContext.create("libx264", "w")
-    codec.width = codec.height = size
-    codec.pix_fmt = "yuv420p"
-    codec.framerate = 30
-    codec.gop_size = gop
-    codec.max_b_frames = 0
-    codec.options = {"preset": "ultrafast", "tune": "zerolatency", "x264-params": "repeat-headers=1:scenecut=0"}
-    pixels = np.random.default_rng(1)
-    packets = []
-    for index in range(count):
-        image = np.full((size, size, 3), index * 4 % 256, np.uint8)
-        image[: size // 2] = pixels.integers(0, 256, (size // 2, size, 3), np.uint8)
-        packets += codec.encode(av.VideoFrame.from_ndarray(image, "rgb24"))
-    packets += codec.encode(None)
-    return tuple(bytes(packet) for packet in packets)
 
 
 class TinySource:

@@ -8,7 +8,8 @@ import pytest
 
 from drivers.driver import SensorState
 from drivers.sim.gopro_device import Quirks
-from tests.drivers.gopro.rig import STREAM_PORT, Running, config, emulator, loopback_address, tiny_units
+from tests.drivers.gopro.rig import STREAM_PORT, Running, config, emulator, loopback_address
+from tests.drivers.sources import tiny_units
 from tests.waiting import wait_for
 
 

@@ -15,7 +15,7 @@ from drivers.gopro.keepalive import KEEP_ALIVE, KeepAlive
 from drivers.gopro.pts import WRAP, PtsTimeline, ticks_to_ns
 from drivers.gopro.transport_stream import AccessUnit
 from drivers.gopro.watchdog import StreamSigns, Watchdog
-from tests.drivers.gopro.rig import tiny_units
+from tests.drivers.sources import tiny_units
 
 FRAME_NS = 33_366_667
 

@@ -16,7 +16,7 @@ from drivers.gopro.datagrams import DatagramOrder
 from drivers.gopro.tables import crc32_mpeg
 from drivers.gopro.transport_stream import Demuxer
 from drivers.sim.transport_mux import AUDIO_PID, VIDEO_PID, TransportMux
-from tests.drivers.gopro.rig import tiny_units
+from tests.drivers.sources import tiny_units
 
 CLIP = Path(__file__).parents[3] / "../shared/data/gopro/max-heromode.mp4"
 PACKET = 188

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 
 from drivers.driver import SensorHealth
 from drivers.livox.config import Config
@@ -103,7 +104,7 @@ def emulated(*faults: str, **device) -> Iterator[tuple[Emulator, str, str]]:
 
 @contextlib.contextmanager
 def driving(emulator: Emulator, config: Config) -> Iterator[Rig]:
-    """The driver in a thread."""
+    """The driver in a thread. The test is skipped where the emulator was a second late and had to leave packets out."""
     rig = Rig(Sensor("livox", config), emulator, emulator._plan)
     stop = threading.Event()
     thread = threading.Thread(target=rig.sensor.run, args=(rig.messages.append, stop))
@@ -113,6 +114,8 @@ def driving(emulator: Emulator, config: Config) -> Iterator[Rig]:
     finally:
         stop.set()
         thread.join()
+    if emulator._point_stream.skipped:
+        pytest.skip("this machine is too slow just now for an emulated LiDAR")
 
 
 @contextlib.contextmanager

@@ -2,7 +2,9 @@
 
 import json
 import socket
+import threading
 import time
+from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
@@ -14,9 +16,24 @@ from drivers.reach.driver import Sensor
 from drivers.sim.faults import parse
 from drivers.sim.reach_emulator import ReachSettings, Receiver
 from drivers.sim.reach_emulator_ports import PseudoTerminal, TcpServer
-from tests.drivers.reach import emulated, nmea_oracle
+from tests.drivers.reach import nmea_oracle
+from tests.drivers.sources import DATUM, Eastward
 from tests.drivers.switched import SwitchedPlan
 from tests.waiting import PATIENCE_S, wait_for
+
+
+@contextmanager
+def in_thread(target, *args, **kwargs):
+    """A thread that takes a stop event as its keyword `stop`."""
+    stop = threading.Event()
+    thread = threading.Thread(target=target, args=args, kwargs=kwargs | {"stop": stop}, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive()
 
 
 class Setup:
@@ -37,11 +54,11 @@ class Setup:
         self.sensor = Sensor("reach", Config(endpoint=endpoint, rate_hz=self.settings.rate_hz, reconnect_s=0.02))
 
     def emulator(self):
-        receiver = Receiver(emulated.Circle(), self.plan, self.epoch_ns, [self.port], self.settings)
-        return emulated.in_thread(receiver.run, truth=self.truth)
+        receiver = Receiver(Eastward(), self.plan, self.epoch_ns, [self.port], self.settings)
+        return in_thread(receiver.run, truth=self.truth)
 
     def driver(self):
-        return emulated.in_thread(self.sensor.run, self.recorded.append)
+        return in_thread(self.sensor.run, self.recorded.append)
 
     def solved(self):
         """Epochs so far, sent or not."""
@@ -55,7 +72,7 @@ class Setup:
 
     def walk_s(self, fix):
         """When the fix was taken, by its position."""
-        return emulated.DATUM.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m)[0]
+        return DATUM.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m)[0]
 
     def lateness_s(self):
         """The longest way of a fix to the driver: a tenth of a second, and whatever a busy machine adds."""

@@ -22,7 +22,9 @@ def _expm(turn):
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
 
 
-@pytest.mark.parametrize("carrier", ["handheld", "bicycle", "uav"])
+@pytest.mark.parametrize(
+    "carrier", ["handheld", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bicycle", "uav"))]
+)
 def test_perfect_readings_integrate_to_the_trajectory(carrier):
     trajectory = build(WorldConfig(carrier=carrier)).trajectory
     imu, step = Imu(trajectory, PERFECT, 1), 1_000_000

@@ -22,7 +22,12 @@ def test_demo_is_a_minute_with_tree_of_heaven_beside_the_path():
     assert (away < 6.0).sum() >= 6
 
 
-@pytest.mark.parametrize("name", list(SCENARIOS))
+LONG = {"loop_800", "loop_1200", "out_and_back_1200"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SCENARIOS]
+)
 def test_every_scenario_has_a_walk_clear_of_stems(name):
     world = build(scenario(name))
     at = world.trajectory.poses(np.arange(0, world.trajectory.duration_ns, 400_000_000))[0]

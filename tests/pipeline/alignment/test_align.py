@@ -84,6 +84,7 @@ def test_two_walks_in_one_stand_find_each_other_without_any_coordinates(tmp_path
     assert np.abs(moved - expected).max() < 0.4
 
 
+@pytest.mark.slow
 def test_two_walks_that_share_no_place_are_refused(tmp_path):
     found, *_ = walked(tmp_path, grow("mixed", 0, side_m=90.0), (30.0, 10.0), 14.0)
     assert any("another pose" in doubt for doubt in found.doubts)

@@ -59,7 +59,7 @@ def test_information_of_many_poses_is_that_of_histograms_one_by_one(field):
 
 def test_information_of_a_field_about_itself_is_two_and_about_chance_is_one():
     levels = np.indices((12, 12)).sum(axis=0) % 4
-    xy = np.argwhere(np.ones((12, 12))).astype(float)
+    xy = np.ascontiguousarray(np.argwhere(np.ones((12, 12))), float)
     known = np.ones((13, 13), np.bool_)
     values = np.zeros((13, 13))
     values[:12, :12] = levels / 3

@@ -69,7 +69,7 @@ def test_two_sessions_over_the_same_ground_share_their_splits():
     assert parted == []
 
 
-@pytest.mark.parametrize("seed", [0, 1, 7])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 7))])
 def test_shares_are_met_for_each_source_and_the_same_seed_divides_the_same(seed):
     records = line(1500) + [image(f"photo{k}", source="inaturalist", group=f"observation {k // 2}") for k in range(400)]
     rules = Rules(seed=seed)

@@ -27,7 +27,7 @@ def test_wrong_stamps_are_told_live_and_afterwards(late_s):
         assert found_s == pytest.approx(late_s, abs=0.2)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_nothing_is_said_of_a_sound_receiver(seed):
     walk = Walk(seconds=300, size_m=20.0, seed=seed)
     fusion, _ = fused(walk, walk.fixes(sigma_m=1.0))
