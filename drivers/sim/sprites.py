@@ -48,7 +48,8 @@ def draw_sprites(seed: int) -> Sprites:
     taken = 0
     for species in Species:
         for variant in range(VARIANTS):
-            largest = _draw(species, rng)
+            largest = _draw(species, rng).astype(np.float32)
+            largest[..., 3] /= 255.0
             for size_index, size in enumerate(SIZES_PX):
                 picture = _shrink(largest, size)
                 pixels.append(picture.reshape(-1, 4))
@@ -57,11 +58,10 @@ def draw_sprites(seed: int) -> Sprites:
     return Sprites(np.ascontiguousarray(np.concatenate(pixels)), start)
 
 
-def _shrink(picture: Picture, size: int) -> Picture:
-    """Area average, colours weighted by alpha; a pixel is leaf where a third of it is covered."""
-    alpha = picture[..., 3:].astype(np.float32) / 255.0
-    colour = cv2.resize(picture[..., :3].astype(np.float32) * alpha, (size, size), interpolation=cv2.INTER_AREA)
-    cover = cv2.resize(alpha[..., 0], (size, size), interpolation=cv2.INTER_AREA)
+def _shrink(picture: npt.NDArray[np.float32], size: int) -> Picture:
+    """Area average of a picture that is black where its alpha, 0 or 1, is 0; a pixel is leaf where a third is."""
+    small = cv2.resize(picture, (size, size), interpolation=cv2.INTER_AREA)
+    colour, cover = small[..., :3], small[..., 3]
     out = np.zeros((size, size, 4), dtype=np.uint8)
     out[..., :3] = np.clip(colour / np.maximum(cover, 1e-3)[..., None], 0, 255)
     out[..., 3] = np.where(cover > 0.33, 255, 0)
@@ -79,7 +79,7 @@ def _draw(species: Species, rng: np.random.Generator) -> Picture:
 
 def _tint(base: Colour, rng: np.random.Generator, spread: float = 0.22) -> tuple[int, int, int, int]:
     bright = 1.0 + spread * rng.standard_normal()
-    red, green, blue = (int(np.clip(c * bright, 8, 245)) for c in base)
+    red, green, blue = (int(min(max(c * bright, 8.0), 245.0)) for c in base)
     return red, green, blue, 255
 
 
