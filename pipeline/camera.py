@@ -58,11 +58,8 @@ class CameraModel:
         """Unit vectors (n, 3) in the optical frame through pixels (n, 2)."""
         if not len(pixels):
             return np.empty((0, 3))
-        given = np.ascontiguousarray(pixels, np.float64).reshape(-1, 1, 2)
-        undo = cv2.fisheye.undistortPoints if self.model == "fisheye" else cv2.undistortPoints
-        flat = np.asarray(undo(given, self.matrix, np.array(self.distortion)), np.float64).reshape(-1, 2)
-        for _ in range(REFINED):
-            flat = flat - (self._project(_at_one_metre(flat)) - given.reshape(-1, 2)) / self.focal_px
+        straight = self.model == "pinhole" and not any(self.distortion)
+        flat = (np.asarray(pixels, np.float64) - self.centre_px) / self.focal_px if straight else self._undone(pixels)
         rays = _at_one_metre(flat)
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
@@ -72,6 +69,15 @@ class CameraModel:
         (fx, fy), (cx, cy) = self.focal_px, self.centre_px
         centre = ((cx + 0.5) * sx - 0.5, (cy + 0.5) * sy - 0.5)
         return replace(self, width_px=width_px, height_px=height_px, focal_px=(fx * sx, fy * sy), centre_px=centre)
+
+    def _undone(self, pixels: Array) -> Array:
+        """Where the lens would show pixels (n, 2) if it were straight, at one metre: OpenCV's guess made exact."""
+        given = np.ascontiguousarray(pixels, np.float64).reshape(-1, 1, 2)
+        undo = cv2.fisheye.undistortPoints if self.model == "fisheye" else cv2.undistortPoints
+        flat = np.asarray(undo(given, self.matrix, np.array(self.distortion)), np.float64).reshape(-1, 2)
+        for _ in range(REFINED):
+            flat = flat - (self._project(_at_one_metre(flat)) - given.reshape(-1, 2)) / self.focal_px
+        return flat
 
     def _project(self, points_m: Array) -> Array:
         given, still = np.ascontiguousarray(points_m, np.float64).reshape(-1, 1, 3), np.zeros(3)

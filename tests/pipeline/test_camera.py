@@ -14,7 +14,7 @@ def test_without_distortion_it_is_similar_triangles():
     assert seen.tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE])
+@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE, CameraModel(848, 480, (400.0, 410.0), (423.5, 239.5))])
 def test_a_ray_goes_through_the_pixel_it_came_from(camera):
     pixels = np.random.default_rng(1).uniform([20, 20], [camera.width_px - 20, camera.height_px - 20], (200, 2))
     rays = camera.rays(pixels)

@@ -36,7 +36,7 @@ def session(root: Path, at_s: np.ndarray, rate: np.ndarray) -> Path:
 
 @pytest.fixture
 def walk(tmp_path):
-    at = np.arange(0.0, 80.0, 0.005)
+    at = np.arange(0.0, 50.0, 0.005)
     return session(tmp_path, at, body(at) + np.random.default_rng(1).normal(0, 0.003, (len(at), 3)))
 
 
