@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import logging
 import os
@@ -144,6 +145,12 @@ def _run(command: Command, options: argparse.Namespace) -> int:
     except BrokenPipeError:  # `mapforest info | head`: the reader left, nothing is wrong
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.GOOD
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        where = f" ({error.filename})" if error.filename else ""
+        print(f"mapforest: the disk is full{where}: make room and run the same again", file=sys.stderr)
+        return exit_codes.FAILED
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ class Watch:
     def __init__(self, config: OdometryConfig) -> None:
         self._config = config
         self._misfits = 0
-        self._wrong = 0
         self._surprise = 0.0
         self.contradicted = False
         """Whether scans and inertial samples have been contradicting each other for some time."""
@@ -32,8 +31,7 @@ class Watch:
     def follow(self, found: Registration, unheard_s: float) -> Status:
         """What a scan says of the state. unheard_s: of the inertial sensor, within the step to this scan."""
         residuals, fit = found.residuals, found.fit
-        self._misfits = self._misfits + (residuals.clusters > 0) if fit is Fit.NONE else 0
-        self._wrong = self._wrong + 1 if fit is Fit.WRONG else 0
+        self._misfits = 0 if fit is Fit.GOOD else self._misfits + (residuals.clusters > 0)
         if fit is not Fit.GOOD:
             return Status.COASTING
         if unheard_s < self._config.imu.longest_step_s and residuals.matches > self._config.match.effective:
@@ -50,8 +48,8 @@ class Watch:
         spread = np.sqrt(np.diag(filter_.covariance)[POSITION].max())
         speed = np.linalg.norm(filter_.state.velocity_m_s)
         most = fault.misfits if spread > fault.coasting_m else fault.misfits_most
-        if self._misfits > most or self._wrong > fault.misfits:
-            return f"{max(self._misfits, self._wrong)} scans in a row do not fit the map"
+        if self._misfits > most:
+            return f"{self._misfits} scans in a row do not fit the map"
         if spread > fault.lost_m or not np.isfinite(spread):
             return f"position within the map is uncertain by {spread:.1f} m"
         if speed > fault.fastest_m_s:

@@ -30,6 +30,8 @@ class TileStore:
         self._open: dict[Tile, list[npt.NDArray[np.void]]] = {}
         self._touched: dict[Tile, int] = {}
         self._bytes = 0
+        self._lean: dict[Tile, int] = {}
+        """Bytes of each file when it was thinned last."""
 
     def add(self, cloud: npt.NDArray[np.float32], sweep: int) -> None:
         """A sweep's points (n, 4): x, y, z in `odom`, intensity 0..255."""
@@ -67,9 +69,14 @@ class TileStore:
             self._spill(tile)
 
     def _spill(self, tile: Tile) -> None:
-        points = thinned(np.concatenate(self._open.pop(tile)), self._voxel_m)
-        with _path(self._folder, tile).open("ab") as file:
+        points, path = thinned(np.concatenate(self._open.pop(tile)), self._voxel_m), _path(self._folder, tile)
+        with path.open("ab") as file:
             file.write(points.tobytes())
+            size = file.tell()
+        if size > 2 * self._lean.setdefault(tile, size):  # ways that come by again and again fill no disk
+            points = thinned(np.fromfile(path, POINT), self._voxel_m)
+            path.write_bytes(points.tobytes())
+            self._lean[tile] = points.nbytes
 
 
 def tiles(folder: Path) -> list[Tile]:

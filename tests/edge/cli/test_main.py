@@ -1,3 +1,4 @@
+import errno
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -46,9 +47,16 @@ def test_errors_become_one_line_and_an_exit_code(only, capsys, error, code):
     assert str(error) in told.err
 
 
-def test_a_bug_is_not_hidden(only):
-    only(failing(ZeroDivisionError("a bug")))
-    with pytest.raises(ZeroDivisionError):
+def test_a_full_disk_is_told(only, capsys):
+    only(failing(OSError(errno.ENOSPC, "No space left on device", "/data/0_1.tile")))
+    assert main.main(["status"]) == exit_codes.FAILED
+    assert capsys.readouterr().err == "mapforest: the disk is full (/data/0_1.tile): make room and run the same again\n"
+
+
+@pytest.mark.parametrize("bug", [ZeroDivisionError("a bug"), OSError(errno.EIO, "Input/output error")])
+def test_a_bug_is_not_hidden(only, bug):
+    only(failing(bug))
+    with pytest.raises(type(bug)):
         main.main(["status"])
 
 

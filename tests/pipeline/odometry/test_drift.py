@@ -1,11 +1,12 @@
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.odometry.config import DriftConfig
-from pipeline.odometry.drift import Drift
+from pipeline.odometry.drift import Drift, tilt_along
 
 CONFIG = DriftConfig(yaw_deg_per_root_m=0.5, horizontal=0.01, vertical=0.005, correlated_m=10.0)
 
@@ -66,3 +67,27 @@ def test_a_scan_now_and_then_that_does_not_see_it_costs_little():
     for k in range(100):
         drift.move(np.array([0.1, 0.0, 0.0]), weak=np.array([[1.0, 0.0, 0.0]]) if k % 10 == 0 else np.empty((0, 3)))
     assert math.sqrt(drift.add_to(np.zeros((6, 6)), np.eye(3))[3, 3]) < 0.2 * CONFIG.weak * 10.0
+
+
+def test_a_tilt_lifts_the_way_until_it_is_known():
+    """Oracle: walks on level ground whose vertical is off by what lasts; after 10 m it is measured, to a fifth."""
+    random, count, tilt, step_m = np.random.default_rng(2), 20000, math.radians(1.0), 0.1
+    level = msgspec.structs.replace(CONFIG, vertical=0.0)
+    drift, height, slope = Drift(level), np.zeros(count), tilt * random.standard_normal(count)
+    kept = math.exp(-step_m / level.correlated_m)
+    for k in range(200):
+        if k == 100:
+            measured = slope + tilt * math.sqrt(0.04 / 0.96) * random.standard_normal(count)
+            slope, tilt = slope - 0.96 * measured, 0.2 * tilt
+        slope = kept * slope + math.sqrt(1.0 - kept**2) * tilt * random.standard_normal(count)
+        height += step_m * slope
+        drift.move(np.array([step_m, 0.0, 0.0]), tilt=tilt**2)
+    found = drift.add_to(np.zeros((6, 6)), np.eye(3))
+    assert math.sqrt(found[5, 5]) == pytest.approx(height.std(), rel=0.05)
+
+
+def test_the_tilt_along_a_step_is_that_about_the_axis_across_it():
+    axes, covariance = np.eye(3)[:, :2], np.diag([0.02**2, 0.05**2])
+    assert math.sqrt(tilt_along(np.array([0.3, 0.0, 0.0]), axes, covariance)) == pytest.approx(0.05)
+    assert math.sqrt(tilt_along(np.array([0.0, -0.2, 0.0]), axes, covariance)) == pytest.approx(0.02)
+    assert tilt_along(np.zeros(3), axes, covariance) == 0.0

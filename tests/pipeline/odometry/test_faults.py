@@ -17,6 +17,7 @@ HARMLESS = (
 """Nothing need be said."""
 ENDURED = {
     "crown": Status.COASTING,
+    "elsewhere": Status.COASTING,
     "empty": Status.COASTING,
     "handful": Status.DEGENERATE,
     "laser_2": "no points",
@@ -39,7 +40,6 @@ ENDURED = {
 """Told while it lasts, and the way is found again."""
 SUFFERED = {
     "field": Status.DEGENERATE,
-    "elsewhere": Status.COASTING,
     "silence_8": Status.RESTARTED,
     "leap_back": "went back",
     "in_g_midway": Status.DOUBTFUL,

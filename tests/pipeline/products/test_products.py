@@ -125,6 +125,16 @@ def test_tiles_are_the_same_however_little_memory_there_is(tmp_path):
     assert (everything["intensity"] == 200).sum() > 60
 
 
+def test_a_way_walked_again_and_again_fills_no_disk(tmp_path):
+    folder = tmp_path / "laps"
+    store = TileStore(folder, 8.0, 0.5, 20_000)
+    for sweep in range(200):
+        store.add(cloud((sweep % 10 * 3.0, 0.0, 0.0), seed=sweep % 10), sweep)
+    store.close()
+    kept = sum(read_tile(folder, tile, 0.5).nbytes for tile in tiles(folder))
+    assert sum(path.stat().st_size for path in folder.iterdir()) <= 2 * kept
+
+
 def source(folder: Path, placement: Placement | None) -> MapSource:
     store = TileStore(folder, 8.0, 0.05)
     for sweep in range(3):
