@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -26,6 +27,8 @@ THICK, CLEAR = 0.92, 0.75
 """Points that fill the tolerance are leaves, unless most of what is around lies on the bark."""
 SURELY_THICK = 1.65
 """Of the spread that the range explains: leaves, whatever lies around. Stems from 10 cm have 0.6 to 1.45."""
+LOW_CROWN_M, LOW_CLEAR = 2.6, 0.5
+"""Small trees have leaves from here on; so much of what is around must be bark, for bushes have branches."""
 TRIES = 100
 REACH_M = 0.6
 """Around a candidate: a stem's near side lies within it."""
@@ -57,7 +60,7 @@ def find_stems(points: Layered, voxel_m: float, config: InventoryConfig) -> list
 
     voxel_m: of the map, if it was thinned; 0 where it is not known.
     """
-    fitted = [stem for place in seeds(points, config) if (stem := fit(points, place, voxel_m, config)) is not None]
+    fitted = [stem for place in seeds(points, config) if (stem := _fit_any(points, place, voxel_m, config)) is not None]
     fitted.sort(key=lambda stem: (stem.reason != "", -stem.quality * len(stem.slices)))
     kept: list[Stem] = []
     for stem in fitted:
@@ -84,6 +87,17 @@ def _spread(range_m: float, voxel_m: float, scanner: Scanner) -> float:
     along = scanner.range_sigma_m + scanner.range_growth * range_m
     across = BEAM_SHARE * scanner.beam_rad * range_m
     return float(np.sqrt(BLUR_M**2 + along**2 + across**2 + voxel_m**2 / 12.0))
+
+
+def _fit_any(points: Layered, place: Doubles, voxel_m: float, config: InventoryConfig) -> Stem | None:
+    """As `fit`; what is no stem up to the crowns of trees may be one up to its own crown."""
+    found = fit(points, place, voxel_m, config)
+    if found is not None and not found.reason:
+        return found
+    low = fit(points, place, voxel_m, msgspec.structs.replace(config, highest_m=LOW_CROWN_M))
+    if low is not None and not low.reason and low.inlier_share > LOW_CLEAR:
+        return replace(low, top_m=LOW_CROWN_M)
+    return found
 
 
 def fit(points: Layered, place: Doubles, voxel_m: float, config: InventoryConfig) -> Stem | None:
