@@ -13,6 +13,7 @@ from edge.config import Config
 from edge.errors import EdgeError, FormatError
 from edge.inventory.april_tags import read_april_tags
 from edge.inventory.maps import Found, find_map
+from edge.inventory.pages import PAGE, write_pages
 from edge.process.checkpoint import alone
 from edge.process.product_facts import whole
 from edge.process.watch import Watch
@@ -32,7 +33,6 @@ from pipeline.inventory.trees import (
     with_detections,
 )
 from pipeline.products.inventory_laz import write_inventory_laz
-from pipeline.products.inventory_page import write_plot_page
 from pipeline.products.inventory_tables import (
     write_rejected_csv,
     write_trees_csv,
@@ -41,9 +41,6 @@ from pipeline.products.inventory_tables import (
 )
 
 EDITS, BIAS, FACTS, UNMATCHED = "tree_edits.csv", "device_bias.json", "inventory.json", "field_unmatched.csv"
-PLOT_M = 50.0
-MOST_ON_A_PAGE = 400
-"""Trees; beyond, each square of `PLOT_M` with trees has a page of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,11 +161,7 @@ def _write(folder: Path, given: TreeList, facts: InventoryFacts, found: Found) -
     with whole(folder / "rejected.csv") as path:
         write_rejected_csv(path, given)
     files |= {"trees.gpkg": "layers trees and rejected", "trees.csv": "one row a tree", "rejected.csv": "and why"}
-    for name, title, list_ in _pages(given):
-        notes = [note for note in (facts.why, *facts.notes) if note]
-        with whole(folder / name) as path:
-            write_plot_page(path, title, list_.trees, list_.rejected, notes)
-        files[name] = "stem map, diameters, slices"
+    files[PAGE] = write_pages(folder, given, [note for note in (facts.why, *facts.notes) if note])
     if facts.device_bias is not None:
         (folder / BIAS).write_bytes(msgspec.json.encode(facts.device_bias) + b"\n")
         files[BIAS] = "for other walks with the same device: --device-bias"
@@ -189,24 +182,3 @@ def _write_field_list(folder: Path, tagged: Tagged | None, facts: InventoryFacts
         with whole(folder / UNMATCHED) as path:
             write_unmatched_csv(path, tagged.unmatched)
         facts.files[UNMATCHED] = f"{len(tagged.unmatched)} trees of the field list without a stem"
-
-
-def _pages(given: TreeList) -> list[tuple[str, str, TreeList]]:
-    """Name, title and trees of each page."""
-    if len(given.trees) <= MOST_ON_A_PAGE:
-        return [("plot.html", "Inventory", given)]
-    squares: dict[tuple[int, int], TreeList] = {}
-    for tree in given.trees:
-        squares.setdefault(_square(tree.position_m), TreeList([], [])).trees.append(tree)
-    for one in given.rejected:
-        if (square := _square(one.position_m)) in squares:
-            squares[square].rejected.append(one)
-    return [
-        (f"plot_{x}_{y}.html", f"Inventory of the {PLOT_M:g} m square from {x} {y}", squares[x, y])
-        for x, y in sorted(squares)
-    ]
-
-
-def _square(position_m: Sequence[float] | np.ndarray) -> tuple[int, int]:
-    x, y = (int(np.floor(float(value) / PLOT_M) * PLOT_M) for value in position_m[:2])
-    return x, y

@@ -15,6 +15,8 @@ POINT = np.dtype([("xyz", "<f4", 3), ("height", "<f4"), ("sensor", "<f4", 2), ("
 """xyz: from the map's origin. sensor: x, y, NaN where the map does not say."""
 Block = tuple[int, int]
 LOWEST_M, MARGIN_M = 0.3, 1.5
+MOST_POINTS, LEAST_SIDE_M = 6_000_000, 4.0
+"""Blocks that could hold more are made smaller, down to that side: they are in memory as a whole."""
 _BUFFER = 64 << 20
 
 
