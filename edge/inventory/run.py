@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +12,8 @@ import numpy as np
 from edge.config import Config
 from edge.errors import EdgeError, FormatError
 from edge.inventory.april_tags import read_april_tags
-from edge.inventory.maps import Found, find_map
+from edge.inventory.fine import fine_map
+from edge.inventory.maps import Found, Session, find_map
 from edge.inventory.pages import PAGE, write_pages
 from edge.process.checkpoint import alone
 from edge.process.product_facts import whole
@@ -47,7 +48,8 @@ EDITS, BIAS, FACTS, UNMATCHED = "tree_edits.csv", "device_bias.json", "inventory
 class Asked:
     """marked: a field list of taped trees in the map's coordinates. bias: a file that an earlier run with one wrote.
 
-    field_list: of trees with numbers, in any frame. april_tags: look for them in the session's video.
+    field_list: of trees with numbers, in any frame. april_tags: look for them in the session's video. fine: map the
+    session once more, for diameters.
     """
 
     target: Path
@@ -57,6 +59,7 @@ class Asked:
     field_list: Path | None = None
     april_tags: bool = False
     laz: bool = True
+    fine: bool = False
 
 
 class InventoryFacts(msgspec.Struct):
@@ -80,7 +83,7 @@ class InventoryFacts(msgspec.Struct):
 
 def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, InventoryFacts]:
     """Where the files are, and what is in them. InventoryError, FormatError for what cannot be used."""
-    found = find_map(asked.target, config)
+    found = find_map(asked.target, config, _remap(config, watch) if asked.fine else None)
     folder = asked.output or found.folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -89,7 +92,7 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     edits = read_edits(folder / EDITS) if (folder / EDITS).exists() else []
     listed_trees = read_field_list(asked.field_list) if asked.field_list is not None else None
     with alone(folder):
-        seen, notes = _april_tags(asked, config, watch)
+        seen, notes = _april_tags(asked, found, config, watch)
         watch.stage("stems", done=False)
         measured = take_inventory(found.source, config.inventory, watch.advance, folder)
         given = listed(measured, found.source)
@@ -116,11 +119,19 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     return folder, facts
 
 
-def _april_tags(asked: Asked, config: Config, watch: Watch) -> tuple[list[Sighting], tuple[str, ...]]:
+def _remap(config: Config, watch: Watch) -> Callable[[Session], Path]:
+    return lambda session: fine_map(session.recording, session.places, config, watch)
+
+
+def _april_tags(asked: Asked, found: Found, config: Config, watch: Watch) -> tuple[list[Sighting], tuple[str, ...]]:
     if not asked.april_tags:
         return [], ()
+    if found.session is None or not found.session.recording:
+        raise EdgeError(
+            f"{asked.target}: AprilTags are read in the video of a session; process it, and name its folder"
+        )
     watch.stage("april tags", done=False)
-    return read_april_tags(asked.target, config, watch.advance)
+    return read_april_tags(found.session.recording, found.session.places, config, watch.advance)
 
 
 def _bias(asked: Asked, trees: Sequence[ListedTree], found: Found) -> DeviceBias | None:
