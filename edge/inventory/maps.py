@@ -59,7 +59,7 @@ def find_map(target: Path, config: Config, remap: Callable[[Session], Path] | No
         odometry = session.places.odometry if remap is None else remap(session)
         return _of_stages(target, products / FOLDER, session, odometry, config)
     if remap is not None:
-        raise EdgeError(f"{target}: only a session that was processed, and whose `work` was kept, is mapped once more")
+        raise EdgeError(f"{target}: a session is mapped once more, with its `work` kept; run `mapforest process` first")
     if not target.is_dir():
         return Found(open_map(target), target.with_name(f"{target.name.partition('.')[0]}_{FOLDER}"), None)
     for name in ("map.laz", "map_local.laz"):

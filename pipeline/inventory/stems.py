@@ -42,8 +42,8 @@ TAPER_SHARE, TAPER_SIGMA = -0.045, 0.03
 """Of the radius, a metre: what stems of 10 to 40 cm do, and how they differ."""
 SHOWN, SHOWN_M = 150, 0.3
 TAPE_AWAY_M, TAPE_BAND_M, TAPE_POINTS = 0.1, 0.4, 8
-APART_M = 0.04
-"""Between the barks of two stems, at least."""
+APART_M, FOOT_M = 0.04, 0.3
+"""Between the barks of two stems, at least; and between the axis of one that was followed to its crown and another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,10 +255,14 @@ def _judged_again(stem: Stem, voxel_m: float, config: InventoryConfig) -> Stem:
         return replace(stem, reason=f"as thick as leaves: no bark at {stem.range_m:.0f} m")
     if not config.least_dbh_m <= stem.dbh_m <= config.most_dbh_m:
         return replace(stem, reason=f"diameter {100 * stem.dbh_m:.0f} cm")
+    if stem.slice_spread_m > 0.25 * stem.dbh_m + 0.01:
+        return replace(stem, reason="slices disagree about the diameter")
     return stem
 
 
 def _same(one: Stem, other: Stem) -> bool:
-    """Whether the two stand in each other, at breast height or further up."""
+    """Whether the two stand in each other, at breast height or further up; or one is the foot of the other."""
     least = 0.5 * max(one.dbh_m, other.dbh_m) + APART_M
+    if np.isfinite(min(one.top_m, other.top_m)):
+        least = max(least, FOOT_M)
     return any(np.hypot(*(one.axis_at(h) - other.axis_at(h))) < least for h in (BREAST_M, 3.0))

@@ -73,5 +73,5 @@ def test_the_products_of_a_refinement_are_the_same_map_on_its_trajectory(recordi
 
 
 def test_a_file_is_not_mapped_once_more(tmp_path):
-    with pytest.raises(EdgeError, match="only a session"):
+    with pytest.raises(EdgeError, match="run `mapforest process` first"):
         find_map(tmp_path / "map.laz", Config(), remap(None))
