@@ -29,6 +29,8 @@ SURELY_THICK = 1.65
 """Of the spread that the range explains: leaves, whatever lies around. Stems from 10 cm have 0.6 to 1.45."""
 LOW_CROWN_M, LOW_CLEAR = 2.6, 0.5
 """Small trees have leaves from here on; so much of what is around must be bark, for bushes have branches."""
+UNKNOWN = 0.25
+"""Sigma of a diameter, as its share beyond a centimetre: above, it is none, and mostly there is no stem either."""
 TRIES = 100
 REACH_M = 0.6
 """Around a candidate: a stem's near side lies within it."""
@@ -255,8 +257,8 @@ def _judged_again(stem: Stem, voxel_m: float, config: InventoryConfig) -> Stem:
         return replace(stem, reason=f"as thick as leaves: no bark at {stem.range_m:.0f} m")
     if not config.least_dbh_m <= stem.dbh_m <= config.most_dbh_m:
         return replace(stem, reason=f"diameter {100 * stem.dbh_m:.0f} cm")
-    if stem.slice_spread_m > 0.25 * stem.dbh_m + 0.01:
-        return replace(stem, reason="slices disagree about the diameter")
+    if stem.dbh_sigma_m > UNKNOWN * stem.dbh_m + 0.01:
+        return replace(stem, reason=f"diameter known to {100 * stem.dbh_sigma_m:.0f} cm only")
     return stem
 
 
