@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 
 import msgspec
@@ -67,12 +68,18 @@ def run(args: argparse.Namespace) -> int:
         not args.no_laz,
         args.fine,
     )
+    logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     out = console(stderr=args.json)
     try:
         with StageBar(quiet=args.json) as bar:
             folder, facts = run_inventory(asked, load(args.config), bar)
     except InventoryError as error:
         raise EdgeError(str(error)) from error
+    except OSError as error:
+        where = error.filename or asked.output or asked.target
+        raise EdgeError(
+            f"{where}: {error.strerror or error}; make room, or give another place with --output"
+        ) from error
     if args.json:
         print(msgspec.json.encode({"folder": str(folder), **msgspec.to_builtins(facts)}).decode())
         return exit_codes.GOOD if facts.trees else exit_codes.WARNINGS

@@ -1,5 +1,7 @@
 import csv
+import errno
 import json
+import os
 import re
 
 import laspy
@@ -108,6 +110,15 @@ def test_no_trees_are_an_empty_table_with_the_reason(tmp_path, capsys):
     assert told["trees"] == 0
     assert told["why"]
     assert (tmp_path / "bare_inventory" / "trees.csv").read_text().startswith("tree_id,")
+
+
+def test_a_full_disk_is_told_with_what_to_do(plot, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("pipeline.inventory.blocks.BlockStore.flush", full)
+    assert main(["inventory", str(plot), "--output", str(tmp_path / "out"), "--no-laz"]) == exit_codes.FAILED
+    assert "No space left on device; make room" in capsys.readouterr().err
 
 
 def test_what_is_no_map_is_told(tmp_path, capsys):
