@@ -31,6 +31,7 @@ FOLDER = "inventory"
 class Session:
     """What a map's stages left. recording: its folder or files; nothing where it is not beside the products."""
 
+    name: str
     recording: tuple[Path, ...]
     places: Places
 
@@ -73,14 +74,15 @@ def find_map(target: Path, config: Config, remap: Callable[[Session], Path] | No
 
 def _session(products: Path) -> Session | None:
     """None where the stages' files are not there."""
-    first, own = products.absolute(), products / "work"
+    first, own, of = products.absolute(), products / "work", ""
     places = Places.of(own)
     if first.name == refine.FOLDER:
-        first = first.parent
+        first, of = first.parent, ", refined"
         work = first / "work"
         places = Places(work / "odometry", own / "refinement", work / "detection", own / "grounding")
     there = (places.odometry / odometry_stage.TRACK).exists() and tiles(places.odometry / odometry_stage.TILES)
-    return Session(_recording(first), places) if there else None
+    name = first.parent.name if first.name == "products" else first.name.removesuffix("_products")
+    return Session(name + of, _recording(first), places) if there else None
 
 
 def _recording(products: Path) -> tuple[Path, ...]:
@@ -99,7 +101,7 @@ def _of_stages(target: Path, folder: Path, session: Session, odometry: Path, con
     facts = msgspec.json.decode((odometry / odometry_stage.FACTS).read_bytes(), type=OdometryFacts)
     voxel_m = facts.voxel_m or config.products.voxel_m
     track = read_track(odometry / odometry_stage.TRACK)
-    source = TileMap(odometry / odometry_stage.TILES, voxel_m, track["position_m"], placement, target.absolute().name)
+    source = TileMap(odometry / odometry_stage.TILES, voxel_m, track["position_m"], placement, session.name)
     grounded, detected = places.grounding / trees_file.TREES, None
     if grounded.exists():
         frame = "odom" if placement is None else "map"

@@ -67,7 +67,7 @@ def test_the_products_of_a_refinement_are_the_same_map_on_its_trajectory(recordi
     moved = Placement((47.0, 8.0, 500.0), np.tile(up, (count, 1)), np.zeros(count), np.zeros((count, 6, 6)))
     write_placement(products / "refined" / "work" / "refinement" / PLACEMENT, moved)
     refined = find_map(products / "refined", Config())
-    assert refined.folder == products / "refined" / "inventory"
+    assert (refined.folder, refined.source.name) == (products / "refined" / "inventory", "walk, refined")
     assert refined.source.count == first.source.count
     assert min(part.xyz_m[:, 2].min() for part in refined.source.parts()) > 20.0
 
