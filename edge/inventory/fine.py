@@ -19,7 +19,7 @@ from edge.replay.replay import Replay
 from pipeline.products.track import read_track
 
 FINE_M = 0.02
-"""Voxels; finer ones change no diameter."""
+"""Voxels, those that the figures of docs/inventory.md are for."""
 STAGE = "fine"
 _APART_M = 0.005
 """Two runs of the odometry are one to rounding."""

@@ -15,7 +15,7 @@ from pipeline.products.inventory_page import write_overview_page, write_plot_pag
 PAGE, SQUARES = "plot.html", "squares"
 SQUARE_M = 50.0
 MOST_ON_A_PAGE = 400
-"""Trees; 2.5 MB. A browser takes seconds for thousands of slices."""
+"""Trees; a megabyte."""
 
 
 def write_pages(folder: Path, given: TreeList, notes: Sequence[str]) -> str:
