@@ -13,7 +13,7 @@ PEERS = ("icp", "plane", "gicp", "fgr", "ransac")
 def main() -> None:
     """Each prints tables in Markdown."""
     parser = argparse.ArgumentParser(prog="benchmarks.alignment", description=__doc__)
-    parser.add_argument("what", choices=["chablais", "fort-valley", "stands", "sessions", "poses", "table"])
+    parser.add_argument("what", choices=["chablais", "fort-valley", "patches", "stands", "sessions", "poses", "table"])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/forest"))
     parser.add_argument("--first", type=int, default=0, help="perturbation, or made-up pair, to begin with")
     parser.add_argument("--count", type=int, default=100, help="how many")
@@ -33,13 +33,14 @@ def main() -> None:
 
 
 def _trials(args: argparse.Namespace) -> None:
-    from benchmarks.alignment.real_trials import chablais, fort_valley
+    from benchmarks.alignment.real_trials import chablais, fort_valley, patches
     from benchmarks.alignment.session_trials import sessions
     from benchmarks.alignment.stand_trials import stands
     from benchmarks.alignment.tables import log, read_log, tables
     from benchmarks.alignment.trials import Asked
 
-    run = {"chablais": chablais, "fort-valley": fort_valley, "stands": stands, "sessions": sessions}
+    run = {"chablais": chablais, "fort-valley": fort_valley, "patches": patches}
+    run |= {"stands": stands, "sessions": sessions}
     if args.what in run:
         with tempfile.TemporaryDirectory() as folder:
             peers = tuple(one for one in args.methods if one in PEERS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -17,13 +18,29 @@ SAME_OUTLINE = 0.7
 
 def chablais(asked: Asked) -> Iterator[Trial]:
     """50 x 50 m, 110 stems."""
-    aerial, stems = asked.data / "chablais3_als.laz", asked.data / "chablais3_trees.csv"
-    places = read_stems(stems).places_m
+    yield from _stems(asked, "chablais3", asked.data / "chablais3_trees.csv")
+
+
+def patches(asked: Asked) -> Iterator[Trial]:
+    """Three, as published: the two halves of `chablais3`, 50 x 26 m with 55 stems, and Fort Valley."""
+    table = asked.data / "chablais3_trees.csv"
+    y = read_stems(table).places_m[:, 1]
+    head, *rows = table.read_text(encoding="utf-8").splitlines()
+    for name, inside in (("south", y < np.mean([y.min(), y.max()])), ("north", y >= np.mean([y.min(), y.max()]))):
+        half = asked.folder / f"{name}.csv"
+        half.write_text("\n".join([head, *(row for row, kept in zip(rows, inside, strict=True) if kept)]) + "\n")
+        yield from _stems(asked, f"chablais3, {name}ern half", half)
+    yield from fort_valley(asked)
+
+
+def _stems(asked: Asked, pair: str, stems: Path) -> Iterator[Trial]:
+    """Of `chablais3`, under its airborne scan."""
+    aerial, places = asked.data / "chablais3_als.laz", read_stems(stems).places_m
     trues = list(pushes((places.min(axis=0) + places.max(axis=0)) / 2, asked.first, asked.count))
     for true in trues:
         ground = push_stems(stems, asked.folder / "stems.csv", true)
-        yield from each(asked, Case("chablais3", aerial, ground, true))
-    yield from peers(asked, "chablais3", aerial, stems, trues)
+        yield from each(asked, Case(pair, aerial, ground, true))
+    yield from peers(asked, pair, aerial, stems, trues)
 
 
 def fort_valley(asked: Asked) -> Iterator[Trial]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 
 import msgspec
@@ -16,15 +17,16 @@ from edge.errors import EdgeError
 
 HELP = """stems, diameters, heights and crowns from a map
 
-example: mapforest inventory recordings/20261124T101500Z_walk
+example: mapforest inventory recordings/20261124T101500Z_walk --fine
+         mapforest inventory recordings/20261124T101500Z_walk/products/refined --fine
          mapforest inventory plot.laz --marked taped_trees.csv
          mapforest inventory plot.ply --output plot_trees --no-laz
          mapforest inventory plot.laz --field-list plot_17.csv
          mapforest inventory recordings/20261124T101500Z_walk --april-tags --field-list plot_17.csv
 
-Takes a session that was processed, or a map as LAS, LAZ or PLY in metres. Writes trees.gpkg, trees.csv, rejected.csv
-(with the reasons), a page with stem map and slices, trees.laz, and tree_edits.csv: there you confirm, add and delete
-trees; it survives, and every run begins with it. Done with warnings when there are no trees."""
+Takes a session that was processed, or refined, or a map as LAS, LAZ or PLY in metres. Writes trees.gpkg, trees.csv,
+rejected.csv (with the reasons), a page with stem map and slices, trees.laz, and tree_edits.csv: there you confirm, add
+and delete trees; it survives, and every run begins with it. Done with warnings when there are no trees."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="read AprilTags (36h11) on stems in the session's video as tree numbers",
     )
     parser.add_argument("--device-bias", type=Path, metavar="FILE", help="device_bias.json of an earlier run")
+    parser.add_argument("--fine", action="store_true", help="map the session once more at 2 cm: for its diameters")
     parser.add_argument("--no-laz", action="store_true", help="leave out trees.laz")
 
 
@@ -56,14 +59,27 @@ def run(args: argparse.Namespace) -> int:
     from pipeline.inventory.errors import InventoryError
 
     asked = Asked(
-        args.map, args.output, args.marked, args.device_bias, args.field_list, args.april_tags, not args.no_laz
+        args.map,
+        args.output,
+        args.marked,
+        args.device_bias,
+        args.field_list,
+        args.april_tags,
+        not args.no_laz,
+        args.fine,
     )
+    logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
     out = console(stderr=args.json)
     try:
         with StageBar(quiet=args.json) as bar:
             folder, facts = run_inventory(asked, load(args.config), bar)
     except InventoryError as error:
         raise EdgeError(str(error)) from error
+    except OSError as error:
+        where = error.filename or asked.output or asked.target
+        raise EdgeError(
+            f"{where}: {error.strerror or error}; make room, or give another place with --output"
+        ) from error
     if args.json:
         print(msgspec.json.encode({"folder": str(folder), **msgspec.to_builtins(facts)}).decode())
         return exit_codes.GOOD if facts.trees else exit_codes.WARNINGS

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from edge.config import Config
-from edge.errors import EdgeError, FormatError
+from edge.errors import FormatError
 from edge.process import fusion_stage, odometry_stage
 from edge.process.ahead import ahead
 from edge.process.camera_way import CameraWay
 from edge.process.fusion_stage import read_placement
+from edge.process.places import Places
 from edge.replay.frames import VideoFrames, every, video_topic
 from edge.replay.replay import Replay
 from edge.replay.rig import camera_rig, recorded_calibration
@@ -25,22 +26,18 @@ _DEPTH = 3
 
 
 def read_april_tags(
-    session: Path, config: Config, advance: Callable[[float], None]
+    recording: Sequence[Path], places: Places, config: Config, advance: Callable[[float], None]
 ) -> tuple[list[Sighting], tuple[str, ...]]:
-    """Where they are in the frame of the session's map, and what has to be said. EdgeError for what is no session."""
-    work = session / "products" / "work"
-    track = work / "odometry" / odometry_stage.TRACK
-    if not any(session.glob("*.mcap")) or not track.exists():
-        raise EdgeError(f"{session}: AprilTags are read in the video of a session; process it, and name its folder")
-    store = MessageStore([session])
+    """Where they are in the frame of the session's map, and what has to be said."""
+    store = MessageStore(recording)
     topic = video_topic(store.topics, store.recording.effective(config).topics)
     if not topic or not store.count(topic):
         return [], ("there is no video in the recording: no AprilTags were read",)
-    replay = Replay([session], config)
+    replay = Replay(recording, config)
     calibration = recorded_calibration(replay.facts, config.calibration)
     rig = camera_rig(calibration, replay.static_transforms, config.calibration)
-    path = work / "fusion" / fusion_stage.PLACEMENT
-    way = CameraWay(read_track(track), read_placement(path) if path.exists() else None, rig)
+    path, track = places.fusion / fusion_stage.PLACEMENT, read_track(places.odometry / odometry_stage.TRACK)
+    way = CameraWay(track, read_placement(path) if path.exists() else None, rig)
     frames = VideoFrames(store, topic)
     start_ns, end_ns = frames.span_ns
     try:

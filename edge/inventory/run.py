@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +12,9 @@ import numpy as np
 from edge.config import Config
 from edge.errors import EdgeError, FormatError
 from edge.inventory.april_tags import read_april_tags
-from edge.inventory.maps import Found, find_map
+from edge.inventory.fine import fine_map
+from edge.inventory.maps import Found, Session, find_map
+from edge.inventory.pages import PAGE, write_pages
 from edge.process.checkpoint import alone
 from edge.process.product_facts import whole
 from edge.process.watch import Watch
@@ -32,7 +34,6 @@ from pipeline.inventory.trees import (
     with_detections,
 )
 from pipeline.products.inventory_laz import write_inventory_laz
-from pipeline.products.inventory_page import write_plot_page
 from pipeline.products.inventory_tables import (
     write_rejected_csv,
     write_trees_csv,
@@ -41,16 +42,14 @@ from pipeline.products.inventory_tables import (
 )
 
 EDITS, BIAS, FACTS, UNMATCHED = "tree_edits.csv", "device_bias.json", "inventory.json", "field_unmatched.csv"
-PLOT_M = 50.0
-MOST_ON_A_PAGE = 400
-"""Trees; beyond, each square of `PLOT_M` with trees has a page of its own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
     """marked: a field list of taped trees in the map's coordinates. bias: a file that an earlier run with one wrote.
 
-    field_list: of trees with numbers, in any frame. april_tags: look for them in the session's video.
+    field_list: of trees with numbers, in any frame. april_tags: look for them in the session's video. fine: map the
+    session once more, for diameters.
     """
 
     target: Path
@@ -60,6 +59,7 @@ class Asked:
     field_list: Path | None = None
     april_tags: bool = False
     laz: bool = True
+    fine: bool = False
 
 
 class InventoryFacts(msgspec.Struct):
@@ -83,7 +83,7 @@ class InventoryFacts(msgspec.Struct):
 
 def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, InventoryFacts]:
     """Where the files are, and what is in them. InventoryError, FormatError for what cannot be used."""
-    found = find_map(asked.target, config)
+    found = find_map(asked.target, config, _remap(config, watch) if asked.fine else None)
     folder = asked.output or found.folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -92,7 +92,7 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     edits = read_edits(folder / EDITS) if (folder / EDITS).exists() else []
     listed_trees = read_field_list(asked.field_list) if asked.field_list is not None else None
     with alone(folder):
-        seen, notes = _april_tags(asked, config, watch)
+        seen, notes = _april_tags(asked, found, config, watch)
         watch.stage("stems", done=False)
         measured = take_inventory(found.source, config.inventory, watch.advance, folder)
         given = listed(measured, found.source)
@@ -119,11 +119,19 @@ def run_inventory(asked: Asked, config: Config, watch: Watch) -> tuple[Path, Inv
     return folder, facts
 
 
-def _april_tags(asked: Asked, config: Config, watch: Watch) -> tuple[list[Sighting], tuple[str, ...]]:
+def _remap(config: Config, watch: Watch) -> Callable[[Session], Path]:
+    return lambda session: fine_map(session.recording, session.places, config, watch)
+
+
+def _april_tags(asked: Asked, found: Found, config: Config, watch: Watch) -> tuple[list[Sighting], tuple[str, ...]]:
     if not asked.april_tags:
         return [], ()
+    if found.session is None or not found.session.recording:
+        raise EdgeError(
+            f"{asked.target}: AprilTags are read in the video of a session; process it, and name its folder"
+        )
     watch.stage("april tags", done=False)
-    return read_april_tags(asked.target, config, watch.advance)
+    return read_april_tags(found.session.recording, found.session.places, config, watch.advance)
 
 
 def _bias(asked: Asked, trees: Sequence[ListedTree], found: Found) -> DeviceBias | None:
@@ -164,11 +172,7 @@ def _write(folder: Path, given: TreeList, facts: InventoryFacts, found: Found) -
     with whole(folder / "rejected.csv") as path:
         write_rejected_csv(path, given)
     files |= {"trees.gpkg": "layers trees and rejected", "trees.csv": "one row a tree", "rejected.csv": "and why"}
-    for name, title, list_ in _pages(given):
-        notes = [note for note in (facts.why, *facts.notes) if note]
-        with whole(folder / name) as path:
-            write_plot_page(path, title, list_.trees, list_.rejected, notes)
-        files[name] = "stem map, diameters, slices"
+    files[PAGE] = write_pages(folder, given, [note for note in (facts.why, *facts.notes) if note])
     if facts.device_bias is not None:
         (folder / BIAS).write_bytes(msgspec.json.encode(facts.device_bias) + b"\n")
         files[BIAS] = "for other walks with the same device: --device-bias"
@@ -189,24 +193,3 @@ def _write_field_list(folder: Path, tagged: Tagged | None, facts: InventoryFacts
         with whole(folder / UNMATCHED) as path:
             write_unmatched_csv(path, tagged.unmatched)
         facts.files[UNMATCHED] = f"{len(tagged.unmatched)} trees of the field list without a stem"
-
-
-def _pages(given: TreeList) -> list[tuple[str, str, TreeList]]:
-    """Name, title and trees of each page."""
-    if len(given.trees) <= MOST_ON_A_PAGE:
-        return [("plot.html", "Inventory", given)]
-    squares: dict[tuple[int, int], TreeList] = {}
-    for tree in given.trees:
-        squares.setdefault(_square(tree.position_m), TreeList([], [])).trees.append(tree)
-    for one in given.rejected:
-        if (square := _square(one.position_m)) in squares:
-            squares[square].rejected.append(one)
-    return [
-        (f"plot_{x}_{y}.html", f"Inventory of the {PLOT_M:g} m square from {x} {y}", squares[x, y])
-        for x, y in sorted(squares)
-    ]
-
-
-def _square(position_m: Sequence[float] | np.ndarray) -> tuple[int, int]:
-    x, y = (int(np.floor(float(value) / PLOT_M) * PLOT_M) for value in position_m[:2])
-    return x, y

@@ -43,6 +43,8 @@ class OdometryFacts(msgspec.Struct):
     host_offset_ns: int | None = None
     """Session time minus the recording computer's monotonic time; None in recordings of others."""
     operator: str = ""
+    voxel_m: float = 0.0
+    """Of the tiles; 0: an earlier version did not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ class OdometryStage:
         facts.late_scans, facts.late_samples = pairing.left.scans, pairing.left.samples
         facts.notes, facts.damages = self.replay.notes, self.replay.damages
         facts.host_offset_ns = _host_offset_ns(self.replay.facts)
-        facts.operator = self.replay.facts.get("operator", "")
+        facts.operator, facts.voxel_m = self.replay.facts.get("operator", ""), products.voxel_m
         facts.seconds = time.monotonic() - started_s
         (folder / FACTS).write_bytes(msgspec.json.encode(facts))
         return facts

@@ -78,7 +78,8 @@ def fit_bark(
             gain, best, found, damping = value - best, value, state, 1.0
             information = outer + np.diag(believed + FIRST)
             step = np.linalg.solve(information, gradient + believed * (expected - state))
-            step = np.clip(step, -0.25 * state[RADIUS], 0.25 * state[RADIUS])
+            # As a whole: with its parts cut one by one it may lead down, and nothing is found.
+            step *= min(1.0, 0.25 * state[RADIUS] / max(float(np.abs(step).max()), 1e-9))
             stray = min(max(strays, LEAST_STRAY), MOST_STRAY)
             if gain < 1e-4:
                 break

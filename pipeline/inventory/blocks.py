@@ -15,6 +15,8 @@ POINT = np.dtype([("xyz", "<f4", 3), ("height", "<f4"), ("sensor", "<f4", 2), ("
 """xyz: from the map's origin. sensor: x, y, NaN where the map does not say."""
 Block = tuple[int, int]
 LOWEST_M, MARGIN_M = 0.3, 1.5
+MOST_POINTS, LEAST_SIDE_M = 6_000_000, 4.0
+"""Blocks that could hold more are made smaller, down to that side: they are in memory as a whole."""
 _BUFFER = 64 << 20
 
 
@@ -38,24 +40,32 @@ class BlockStore:
         points["sensor"] = np.nan if part.sensor_m is None else part.sensor_m[kept]
         points["reflector"] = part.reflector[kept]
         cells = np.floor(points["xyz"][:, :2] / self._side_m).astype(np.int64)
+        beyond = points["xyz"][:, :2] - cells * self._side_m  # the lower rim of their block
+        near = {-1: beyond < MARGIN_M, 0: np.ones_like(beyond, np.bool_), 1: beyond >= self._side_m - MARGIN_M}
         for di in (-1, 0, 1):
             for dj in (-1, 0, 1):
-                self._give(points, cells, (di, dj))
+                mine = near[di][:, 0] & near[dj][:, 1]
+                self._give(points[mine], cells[mine] + (di, dj))
         if self._bytes > _BUFFER:
             self.flush()
 
-    def _give(self, points: npt.NDArray[np.void], cells: npt.NDArray[np.int64], step: tuple[int, int]) -> None:
-        there = cells + step
-        low = there * self._side_m - MARGIN_M
-        inside = ((points["xyz"][:, :2] >= low) & (points["xyz"][:, :2] < low + self._side_m + 2 * MARGIN_M)).all(1)
-        mine, there = points[inside], there[inside]
-        if not len(mine):
+    def _give(self, points: npt.NDArray[np.void], blocks: npt.NDArray[np.int64]) -> None:
+        """blocks: (n, 2), whose each point is."""
+        if not len(points):
             return
-        blocks, which = np.unique(there, axis=0, return_inverse=True)
-        for k, block in enumerate(blocks.tolist()):
-            some = mine[which.ravel() == k]
-            self._held[block[0], block[1]].append(some)
-            self._bytes += some.nbytes
+        first = blocks.min(axis=0)
+        rows, columns = (blocks.max(axis=0) - first + 1).tolist()
+        flat = (blocks[:, 0] - first[0]) * columns + blocks[:, 1] - first[1]
+        flat = flat.astype(
+            np.min_scalar_type(rows * columns)
+        )  # small numbers are sorted by their digits: 50 times as fast
+        order, count = np.argsort(flat, kind="stable"), np.bincount(flat)
+        for k, some in zip(
+            np.flatnonzero(count).tolist(), np.split(order, np.cumsum(count[count > 0])[:-1]), strict=True
+        ):
+            mine = points[some]
+            self._held[int(first[0]) + k // columns, int(first[1]) + k % columns].append(mine)
+            self._bytes += mine.nbytes
 
     def flush(self) -> None:
         """Everything to the disk."""

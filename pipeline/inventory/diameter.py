@@ -102,7 +102,7 @@ def _slices(stem: Stem, points: Layered, scanner: Scanner) -> tuple[list[tuple[S
         return [], np.nan
     height, offset, range_m, bearing = height[kept], offset[kept], range_m[kept], (beam / range_m[:, None])[kept]
     found, radius = [], 0.5 * stem.dbh_m
-    for low in np.arange(LOWEST_M, HIGHEST_M - 0.01, SLICE_M) - BREAST_M:
+    for low in np.arange(LOWEST_M, min(HIGHEST_M, stem.top_m) - 0.01, SLICE_M) - BREAST_M:
         mine = (height >= low) & (height < low + SLICE_M)
         middle = low + 0.5 * SLICE_M
         if mine.sum() < LEAST_POINTS:

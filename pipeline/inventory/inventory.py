@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
-from pipeline.inventory.blocks import BlockStore
+from pipeline.inventory.blocks import LEAST_SIDE_M, MARGIN_M, MOST_POINTS, BlockStore
 from pipeline.inventory.candidates import Layered
 from pipeline.inventory.canopy import Canopy, CanopyBuilder
 from pipeline.inventory.config import InventoryConfig
@@ -45,10 +46,10 @@ def take_inventory(
     advance: Callable[[float], None] = lambda _: None,
     scratch: Path | None = None,
 ) -> Inventory:
-    """Reads the map three times. advance: told the share that is done. scratch: folder for what does not fit memory."""
-    first = _first_ground(source, config, advance)
+    """Reads the map twice. advance: told the share that is done. scratch: folder for what does not fit memory."""
+    first, side_m = _first_ground(source, config, advance)
     with tempfile.TemporaryDirectory(prefix="mapforest-inventory-", dir=scratch) as folder:
-        store = BlockStore(Path(folder), config.block_m, config.highest_m + 1.0)
+        store = BlockStore(Path(folder), side_m, config.highest_m + 1.0)
         polish, canopy = TerrainPolish(first), CanopyBuilder(first, config.canopy_cell_m)
         done = 0
         for part in source.parts():
@@ -68,13 +69,19 @@ def take_inventory(
     return Inventory(terrain, crowns, stems, rejected, heights, widths, _why(stems, rejected, store.kept, config))
 
 
-def _first_ground(source: MapSource, config: InventoryConfig, advance: Callable[[float], None]) -> Terrain:
+def _first_ground(
+    source: MapSource, config: InventoryConfig, advance: Callable[[float], None]
+) -> tuple[Terrain, float]:
+    """And the side of blocks that fit memory."""
     builder, done = TerrainBuilder(source, config), 0
     for part in source.parts():
         builder.add(part)
         done += len(part.xyz_m)
         _tell(advance, "ground", done / source.count)
-    return builder.first()
+    side_m = config.block_m
+    while side_m >= 2.0 * LEAST_SIDE_M and builder.most_within(side_m + 2.0 * MARGIN_M) > MOST_POINTS:
+        side_m /= 2.0
+    return builder.first(), side_m
 
 
 def _stems(
@@ -102,12 +109,13 @@ def _stems(
 
 def _once(stems: list[Stem]) -> list[Stem]:
     """On the border of two blocks both may have found a stem."""
-    kept: list[Stem] = []
+    stems = sorted(stems, key=lambda stem: stem.reason != "")
     places = np.array([stem.axis_at(BREAST_M) for stem in stems]).reshape(-1, 2)
-    for stem, place in sorted(zip(stems, places, strict=True), key=lambda pair: pair[0].reason != ""):
-        if all(np.hypot(*(place - other.axis_at(BREAST_M))) > _SAME_M for other in kept):
-            kept.append(stem)
-    return kept
+    kept = np.ones(len(stems), np.bool_)
+    for first, second in sorted(cKDTree(places).query_pairs(_SAME_M)):
+        if kept[first]:
+            kept[second] = False
+    return [stem for stem, stays in zip(stems, kept.tolist(), strict=True) if stays]
 
 
 def _why(stems: list[Stem], rejected: list[Stem], points: int, config: InventoryConfig) -> str:

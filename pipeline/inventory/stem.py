@@ -49,6 +49,8 @@ class Stem:
     """It wears a band of retro-reflecting tape."""
     range_m: float = field(default=np.nan)
     """Median distance that it was seen from, where the map says."""
+    top_m: float = np.inf
+    """It was followed up to there: above begins its own crown."""
     shown_m: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 2), np.float32))
     """(n, 2) some of the points about breast height, from the axis: for a picture."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -26,6 +27,10 @@ THICK, CLEAR = 0.92, 0.75
 """Points that fill the tolerance are leaves, unless most of what is around lies on the bark."""
 SURELY_THICK = 1.65
 """Of the spread that the range explains: leaves, whatever lies around. Stems from 10 cm have 0.6 to 1.45."""
+LOW_CROWN_M, LOW_CLEAR = 2.6, 0.5
+"""Small trees have leaves from here on; so much of what is around must be bark, for bushes have branches."""
+UNKNOWN = 0.25
+"""Sigma of a diameter, as its share beyond a centimetre: above, it is none, and mostly there is no stem either."""
 TRIES = 100
 REACH_M = 0.6
 """Around a candidate: a stem's near side lies within it."""
@@ -39,8 +44,8 @@ TAPER_SHARE, TAPER_SIGMA = -0.045, 0.03
 """Of the radius, a metre: what stems of 10 to 40 cm do, and how they differ."""
 SHOWN, SHOWN_M = 150, 0.3
 TAPE_AWAY_M, TAPE_BAND_M, TAPE_POINTS = 0.1, 0.4, 8
-APART_M = 0.04
-"""Between the barks of two stems, at least."""
+APART_M, FOOT_M = 0.04, 0.3
+"""Between the barks of two stems, at least; and between the axis of one that was followed to its crown and another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +62,7 @@ def find_stems(points: Layered, voxel_m: float, config: InventoryConfig) -> list
 
     voxel_m: of the map, if it was thinned; 0 where it is not known.
     """
-    fitted = [stem for place in seeds(points, config) if (stem := fit(points, place, voxel_m, config)) is not None]
+    fitted = [stem for place in seeds(points, config) if (stem := _fit_any(points, place, voxel_m, config)) is not None]
     fitted.sort(key=lambda stem: (stem.reason != "", -stem.quality * len(stem.slices)))
     kept: list[Stem] = []
     for stem in fitted:
@@ -84,6 +89,17 @@ def _spread(range_m: float, voxel_m: float, scanner: Scanner) -> float:
     along = scanner.range_sigma_m + scanner.range_growth * range_m
     across = BEAM_SHARE * scanner.beam_rad * range_m
     return float(np.sqrt(BLUR_M**2 + along**2 + across**2 + voxel_m**2 / 12.0))
+
+
+def _fit_any(points: Layered, place: Doubles, voxel_m: float, config: InventoryConfig) -> Stem | None:
+    """As `fit`; what is no stem up to the crowns of trees may be one up to its own crown."""
+    found = fit(points, place, voxel_m, config)
+    if found is not None and not found.reason:
+        return found
+    low = fit(points, place, voxel_m, msgspec.structs.replace(config, highest_m=LOW_CROWN_M))
+    if low is not None and not low.reason and low.inlier_share > LOW_CLEAR:
+        return replace(low, top_m=LOW_CROWN_M)
+    return found
 
 
 def fit(points: Layered, place: Doubles, voxel_m: float, config: InventoryConfig) -> Stem | None:
@@ -241,10 +257,14 @@ def _judged_again(stem: Stem, voxel_m: float, config: InventoryConfig) -> Stem:
         return replace(stem, reason=f"as thick as leaves: no bark at {stem.range_m:.0f} m")
     if not config.least_dbh_m <= stem.dbh_m <= config.most_dbh_m:
         return replace(stem, reason=f"diameter {100 * stem.dbh_m:.0f} cm")
+    if stem.dbh_sigma_m > UNKNOWN * stem.dbh_m + 0.01:
+        return replace(stem, reason=f"diameter known to {100 * stem.dbh_sigma_m:.0f} cm only")
     return stem
 
 
 def _same(one: Stem, other: Stem) -> bool:
-    """Whether the two stand in each other, at breast height or further up."""
+    """Whether the two stand in each other, at breast height or further up; or one is the foot of the other."""
     least = 0.5 * max(one.dbh_m, other.dbh_m) + APART_M
+    if np.isfinite(min(one.top_m, other.top_m)):
+        least = max(least, FOOT_M)
     return any(np.hypot(*(one.axis_at(h) - other.axis_at(h))) < least for h in (BREAST_M, 3.0))

@@ -70,6 +70,14 @@ class TerrainBuilder:
         """First time."""
         kernels.keep_lowest(self._lowest, self._count, part.xyz_m, self._low, self._cell_m)
 
+    def most_within(self, side_m: float) -> int:
+        """Points of the fullest square of that side."""
+        cells = max(1, round(side_m / self._cell_m))
+        count: Doubles = self._count.astype(np.float64)
+        for axis in (0, 1):
+            count = ndimage.uniform_filter1d(count, cells, axis, mode="constant") * cells
+        return round(float(count.max()))
+
     def first(self) -> Terrain:
         """From the lowest points. InventoryError without any."""
         if not self._count.any():

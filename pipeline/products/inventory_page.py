@@ -1,4 +1,4 @@
-"""A page a plot: where the trees stand, their diameters, and each stem's slice as a picture."""
+"""A page a plot: where the trees stand, their diameters, and each stem's slice as a picture; and one over many."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ Corner = npt.NDArray[np.float64]
 PICTURE_PX = 96
 _NONE = "-"
 _MAP = "Seen from above, y upwards. Numbers are those of trees.csv; rejected places in grey."
+_WHOLE = "Seen from above, y upwards; rejected places in grey. Numbers and slices are on the pages of the squares."
 TARGET = 0.5
 """Probability from which a tree is shown as of the detected species."""
 
@@ -40,6 +41,30 @@ def write_plot_page(
     path.write_text(sheet.sheet(title, parts), encoding="utf-8")
 
 
+def write_overview_page(
+    path: Path,
+    trees: Sequence[ListedTree],
+    rejected: Sequence[RejectedTree],
+    notes: Sequence[str],
+    squares: Sequence[tuple[str, str, Sequence[ListedTree]]],
+) -> None:
+    """squares: link, name and trees of each page that shows the slices."""
+    parts = [sheet.facts(_facts(trees, rejected))]
+    parts += [sheet.notes(notes)] if notes else []
+    parts.append(sheet.figure("Stems", _map(trees, rejected, numbered=False), _WHOLE))
+    parts.append(sheet.figure("Diameters", _diameters(trees)))
+    parts.append(sheet.section("Squares"))
+    head = ("", "Trees", "Mean DBH", "Quadratic mean DBH", "Basal area", "Mean height")
+    rows = [[f'<a href="{link}">{sheet.text(name)}</a>', *_figures(mine)] for link, name, mine in squares]
+    parts.append(sheet.table(head, rows))
+    path.write_text(sheet.sheet("Inventory", parts), encoding="utf-8")
+
+
+def _figures(trees: Sequence[ListedTree]) -> list[str]:
+    facts = _facts(trees, ())
+    return [facts[name] for name in ("Trees", "Mean DBH", "Quadratic mean DBH", "Basal area", "Mean height")]
+
+
 def _facts(trees: Sequence[ListedTree], rejected: Sequence[RejectedTree]) -> dict[str, str]:
     dbh = np.array([tree.dbh_m for tree in trees])
     height = np.array([tree.height_m for tree in trees])
@@ -54,24 +79,24 @@ def _facts(trees: Sequence[ListedTree], rejected: Sequence[RejectedTree]) -> dic
     }
 
 
-def _map(trees: Sequence[ListedTree], rejected: Sequence[RejectedTree]) -> Plot:
+def _map(trees: Sequence[ListedTree], rejected: Sequence[RejectedTree], *, numbered: bool = True) -> Plot:
     """From a whole corner: seven digits of a grid leave no room for the plot."""
     places = np.array([*(tree.position_m[:2] for tree in trees), *(one.position_m[:2] for one in rejected)])
     corner = np.floor(places.reshape(-1, 2).min(axis=0, initial=np.inf) / 10.0) * 10.0
     corner = np.where(np.isfinite(corner), corner, 0.0)
     target = [tree.probability > TARGET for tree in trees]
     off = np.array([one.position_m[:2] for one in rejected]).reshape(-1, 2) - corner
-    some = [Dots(off[:, 0], off[:, 1], "rejected", "s"), _dots(trees, [not t for t in target], corner, "trees", "a")]
-    if any(target):
-        some.append(_dots(trees, target, corner, "detected species", "t"))
+    some = [Dots(off[:, 0], off[:, 1], "rejected", "s", each=True)]
+    for name, tone, meant in (("trees", "a", False), ("detected species", "t", True)):
+        if mine := [tree for tree, is_target in zip(trees, target, strict=True) if is_target == meant]:
+            some.append(_dots(mine, corner, name, tone, numbered=numbered))
     east, north = (f"{value:,.0f}".replace(",", " ") for value in corner.tolist())
     return Plot(f"x m from {east}", f"y m from {north}", dots=some, equal=True)
 
 
-def _dots(trees: Sequence[ListedTree], which: Sequence[bool], corner: Corner, name: str, tone: str) -> Dots:
-    mine = [tree for tree, meant in zip(trees, which, strict=True) if meant]
-    at = np.array([tree.position_m[:2] for tree in mine]).reshape(-1, 2) - corner
-    return Dots(at[:, 0], at[:, 1], name, tone, [str(tree.tree_id) for tree in mine])
+def _dots(trees: Sequence[ListedTree], corner: Corner, name: str, tone: str, *, numbered: bool) -> Dots:
+    at = np.array([tree.position_m[:2] for tree in trees]) - corner
+    return Dots(at[:, 0], at[:, 1], name, tone, [str(tree.tree_id) for tree in trees] if numbered else (), each=True)
 
 
 def _diameters(trees: Sequence[ListedTree]) -> Plot:

@@ -32,13 +32,14 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Dots:
-    """Single points. labels: what stands beside each, or none at all."""
+    """Single points. labels: what stands beside each, or none at all. each: none is left out, however many."""
 
     x: Array
     y: Array
     name: str
     tone: str = "b"
     labels: Sequence[str] = ()
+    each: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +203,7 @@ def _path(axes: _Axes, line: Line, most: int) -> str:
 
 
 def _circles(axes: _Axes, dots: Dots, most: int) -> str:
-    every = max(1, len(dots.x) // most)
+    every = 1 if dots.each else max(1, len(dots.x) // most)
     pairs = zip(axes.x(dots.x[::every]).tolist(), axes.y(dots.y[::every]).tolist(), strict=True)
     marks = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in pairs if math.isfinite(x + y))
     return f'<path class="dots {dots.tone}" d="{marks}"/>'

@@ -1,5 +1,8 @@
 import csv
+import errno
 import json
+import os
+import re
 
 import laspy
 import numpy as np
@@ -9,6 +12,8 @@ import pytest
 
 from edge.cli import exit_codes
 from edge.cli.main import main
+from edge.inventory.pages import write_pages
+from pipeline.inventory.trees import ListedTree, TreeList
 from tests.pipeline.inventory.plots import PlotMap, Trunk
 
 TRUNKS = [
@@ -43,6 +48,25 @@ def test_others_open_what_is_written(plot):
     page = (folder / "plot.html").read_text()
     assert page.count("slice of tree") == len(TRUNKS)
     assert "http" not in page
+
+
+def test_many_trees_have_a_page_over_all_and_one_for_each_square(tmp_path):
+    (tmp_path / "squares").mkdir()
+    (tmp_path / "squares" / "of_an_earlier_run.html").touch()
+    places = np.random.default_rng(1).uniform((450_000, 5_200_000, 0), (450_100, 5_200_100, 1), (500, 3))
+    trees = [ListedTree(k + 1, at, 0.2, 0.01, 12.0, 3.0) for k, at in enumerate(places)]
+    write_pages(tmp_path, TreeList(trees, []), ["a note"])
+    page = (tmp_path / "plot.html").read_text()
+    links = re.findall(r'href="(squares/[^"]+)"', page)
+    assert sorted(tmp_path.glob("squares/*")) == sorted(tmp_path / link for link in links)
+    assert page.count("h0") >= 500
+    assert "a note" in page
+    shown = [
+        number for link in links for number in re.findall(r'data-label="Tree">(\d+)', (tmp_path / link).read_text())
+    ]
+    assert sorted(map(int, shown)) == list(range(1, 501))
+    write_pages(tmp_path, TreeList(trees[:3], []), [])
+    assert not (tmp_path / "squares").exists()
 
 
 def test_decisions_survive_and_a_second_run_begins_with_them(plot):
@@ -86,6 +110,15 @@ def test_no_trees_are_an_empty_table_with_the_reason(tmp_path, capsys):
     assert told["trees"] == 0
     assert told["why"]
     assert (tmp_path / "bare_inventory" / "trees.csv").read_text().startswith("tree_id,")
+
+
+def test_a_full_disk_is_told_with_what_to_do(plot, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("pipeline.inventory.blocks.BlockStore.flush", full)
+    assert main(["inventory", str(plot), "--output", str(tmp_path / "out"), "--no-laz"]) == exit_codes.FAILED
+    assert "No space left on device; make room" in capsys.readouterr().err
 
 
 def test_what_is_no_map_is_told(tmp_path, capsys):

@@ -3,8 +3,9 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.optimize import least_squares
 
-from pipeline.inventory import bark_kernels, circle_kernels
+from pipeline.inventory import bark_kernels, circle_kernels, inventory
 from pipeline.inventory.bark import fit_bark
+from pipeline.inventory.blocks import BlockStore
 from pipeline.inventory.candidates import Layered
 from pipeline.inventory.config import InventoryConfig, Scanner
 from pipeline.inventory.inventory import take_inventory
@@ -60,11 +61,48 @@ def test_what_is_lost_at_the_edges_of_far_stems_is_made_up_for():
     assert np.mean(error[0.0]) < -0.004
 
 
+def test_a_wide_circle_that_a_fit_begins_with_does_not_stay():
+    sensors, trunk = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), Trunk(0, 15, 0.12, taper=0.0)
+    xyh, stood = trunk.points(np.random.default_rng(1), 500, sensors, (0.0018, 0.0136))
+    beam = (trunk.x, trunk.y) - stood
+    away = np.linalg.norm(beam, axis=1)
+    for radius, shift in ((0.06, (0.0, 0.0)), (0.13, (0.0, 0.1)), (0.16, (0.0, 0.0)), (0.16, (0.05, 0.0))):
+        seen = xyh - (trunk.x + shift[0], trunk.y + shift[1], 1.3)
+        found = fit_bark(seen, beam / away[:, None], away, radius_m=radius, taper=0.0, scanner=CONFIG.scanner)
+        assert found.radius_m == pytest.approx(0.06, abs=0.002)
+
+
+def test_a_small_tree_is_a_stem_up_to_its_own_crown():
+    random = np.random.default_rng(4)
+    small = Trunk(0, 6, 0.12)
+    points = block([small], count=1500)
+    points = points[points["height"] < 2.6]
+    leaves = np.resize(points, 6000).copy()
+    leaves["xyz"] = random.normal([0, 6, 4.3], [0.5, 0.5, 0.8], (len(leaves), 3))
+    leaves["height"] = leaves["xyz"][:, 2]
+    stems = find_stems(Layered.of(np.concatenate([points, leaves[leaves["height"] > 2.6]])), 0.0, CONFIG)
+    (stem,) = [one for one in stems if not one.reason]
+    assert abs(stem.dbh_m - small.dbh) < 0.08 * small.dbh
+    np.testing.assert_allclose(stem.axis_at(1.3), (small.x, small.y), atol=0.02)
+
+
 def test_without_the_place_of_the_scanner_there_are_diameters_too():
     found = take_inventory(PlotMap(TRUNKS, told=False, noise=(0.0005, 0.006)), CONFIG)
     assert len(found.stems) == len(TRUNKS)
     said = sorted(stem.dbh_m for stem in found.stems)
     np.testing.assert_allclose(said, sorted(trunk.dbh for trunk in TRUNKS), rtol=0.12)
+
+
+def test_where_points_are_dense_blocks_are_smaller_and_the_stems_the_same(monkeypatch):
+    source = PlotMap(TRUNKS, each=1000)
+    whole = take_inventory(source, CONFIG)
+    monkeypatch.setattr(inventory, "MOST_POINTS", 10_000)
+    sides = []
+    monkeypatch.setattr(inventory, "BlockStore", lambda *given: (sides.append(given[1]), BlockStore(*given))[1])
+    cut = take_inventory(source, CONFIG)
+    assert sides[0] < CONFIG.block_m / 2
+    assert len(cut.stems) == len(TRUNKS)
+    np.testing.assert_allclose([s.dbh_m for s in cut.stems], [s.dbh_m for s in whole.stems], atol=0.003)
 
 
 def test_nothing_found_says_why():
