@@ -18,7 +18,7 @@ import numpy.typing as npt
 from pipeline.evaluation.diameters import Diameters, paired
 from pipeline.inventory.config import InventoryConfig
 from pipeline.inventory.inventory import take_inventory
-from pipeline.inventory.source import open_map
+from pipeline.inventory.map_file import open_map
 
 Array = npt.NDArray[np.float64]
 PLOTS = ("pine_plot_tls.laz", "fort_valley_mls.laz")

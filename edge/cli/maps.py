@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Of a file, or of the map among the products of a session."""
     from pipeline.evaluation.control import read_control
     from pipeline.evaluation.map import Asked, map_quality
-    from pipeline.inventory.source import open_map
+    from pipeline.inventory.map_file import open_map
 
     if args.truth is not None or args.dataset is not None:
         raise UsageError("evaluate map: give one map; what is known of the place goes to --reference or --control")

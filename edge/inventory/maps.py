@@ -18,7 +18,8 @@ from edge.process.places import Places
 from edge.process.trees_file import read_trees
 from edge.words import duration
 from pipeline.inventory.diameter import COARSE_M
-from pipeline.inventory.source import MapSource, open_map
+from pipeline.inventory.map_file import open_map
+from pipeline.inventory.source import MapSource
 from pipeline.inventory.tilemap import TileMap
 from pipeline.products.tiles import tiles
 from pipeline.products.track import read_track

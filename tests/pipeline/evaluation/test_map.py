@@ -10,7 +10,8 @@ from pipeline.evaluation.control import ControlPoint
 from pipeline.evaluation.errors import EvaluationError
 from pipeline.evaluation.map import Asked, map_quality
 from pipeline.evaluation.map_store import CELL_M, MapStore
-from pipeline.inventory.source import Part, open_map
+from pipeline.inventory.map_file import open_map
+from pipeline.inventory.source import Part
 
 EAST, NORTH, UP = 500_000.0, 4_400_000.0, 60.0
 NOISE_M = 0.015

@@ -4,7 +4,7 @@ import pyproj
 import pytest
 
 from pipeline.inventory.errors import InventoryError
-from pipeline.inventory.source import open_map
+from pipeline.inventory.map_file import open_map
 from pipeline.inventory.tilemap import TileMap
 from pipeline.products.tiles import TileStore
 from pipeline.products.track import Placement
