@@ -30,7 +30,7 @@ FOLDER = "refined"
 """In the folder of the products."""
 CONSTRAINTS = "constraints.toml"
 """The analyst's, in that folder; read where it is there and no other is named."""
-_FORMAT = 2
+_FORMAT = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Work:
         antenna = msgspec.json.decode((self.places.odometry / ANTENNA).read_bytes(), type=tuple[float, float, float])
         fusion = msgspec.structs.replace(self.config.fusion, antenna_m=antenna)
         prints = tuple(fingerprint(recording_files(self.task.targets)))
-        return Given(self.task.session, prints, self.places.odometry, self.placement, self.output, fusion)
+        return Given(self.task.session, prints, self.places.odometry, self.placement, fusion)
 
     def rest(self, key: str) -> list[str]:
         """Grounding and products, of a placement with this key; the stages that had to be done."""

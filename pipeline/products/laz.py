@@ -56,10 +56,10 @@ class MapSource:
 
 
 def write_laz(path: Path, sources: Sequence[MapSource], advance: Callable[[float], None]) -> int:
-    """Write to `path`; returns the number of points. One tile is in memory at a time. All sources have one datum."""
+    """Write to `path`; returns the number of points. One tile is in memory at a time. All sources have one frame."""
     found = [(source, tile) for source in sources for tile in tiles(source.tiles)]
     first = sources[0].placement
-    site = Site(first.datum) if first is not None else None
+    site = Site(first.datum) if first is not None and first.datum is not None else None
     count = 0
     header = _header(sources, site)
     with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
@@ -112,8 +112,10 @@ def _record(
 ) -> laspy.ScaleAwarePointRecord:
     sweeps = points["sweep"].astype(np.int64)
     xyz = points["xyz"].astype(np.float64)
-    if source.placement is not None and site is not None:
-        xyz = site.utm_nearby(source.placement.points(xyz, sweeps))
+    if source.placement is not None:
+        xyz = source.placement.points(xyz, sweeps)
+    if site is not None:
+        xyz = site.utm_nearby(xyz)
     record = laspy.ScaleAwarePointRecord.zeros(len(points), header=header)
     record.x, record.y, record.z = xyz.T
     record.intensity = points["intensity"].astype(np.uint16) * 257
