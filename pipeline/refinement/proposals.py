@@ -18,9 +18,14 @@ from pipeline.refinement.keyframes import Keyframes
 from pipeline.refinement.recognition import Proposal, Recognised, recognise
 from pipeline.refinement.session import Placed, Session, about_vertical
 from pipeline.refinement.stems import place
+from pipeline.refinement.submaps import REACH_M
 
-_ADRIFT_M, _ADRIFT_NS = 150.0, 5_000_000_000
-"""Of way without a fix, and of time without a pose, after which a session may be anywhere."""
+_ADRIFT_M = 150.0
+"""Of way without a fix, after which a session may be anywhere."""
+_BROKEN_NS, _BROKEN_M = 5_000_000_000, 1.0
+"""Time without a pose, and drift of one step, after which the odometry does not know where it is."""
+_SEEN_M = 2.0 * REACH_M
+"""Of way: places nearer than that see the same trees without having come back."""
 
 
 def proposals(
@@ -44,7 +49,7 @@ def proposals(
         places.append(place(submap.points()))
         advance(0.5 * len(places) / len(ends))
     found = list[Recognised]()
-    for b, some in enumerate(recognise(places, _allowed(ends, placed, adrift, config), config.recognition)):
+    for b, some in enumerate(recognise(places, _allowed(ends, placed, adrift), config.recognition)):
         found += some[: config.recognition.each]
         advance(0.5 + 0.5 * (b + 1) / len(ends))
     return [Proposal(_guess(one, ends), one, sum(_agree(one, other, ends) for other in found)) for one in found]
@@ -68,23 +73,30 @@ class _End:
 
 
 def _adrift(placed: Placed, session: Session) -> bool:
-    frames = placed.frames
-    if placed.fixes is None or (np.diff(session.track["stamp_ns"].astype(np.int64)) > _ADRIFT_NS).any():
+    way_m = placed.frames.travelled_m
+    if placed.fixes is None or _pieces(session, placed.frames)[-1]:
         return True
-    way_m = frames.travelled_m
     fixed_m = np.sort(np.concatenate([way_m[placed.fixes.keyframe], way_m[[0, -1]]]))
     return bool(np.diff(fixed_m).max() > _ADRIFT_M)
 
 
-def _allowed(
-    ends: Sequence[_End], placed: Sequence[Placed], adrift: Sequence[bool], config: RefinementConfig
-) -> npt.NDArray[np.bool_]:
+def _pieces(session: Session, frames: Keyframes) -> npt.NDArray[np.int64]:
+    """(m,) how often the odometry was lost before each keyframe."""
+    stamps = session.track["stamp_ns"].astype(np.int64)
+    gaps = np.cumsum(np.diff(stamps, prepend=stamps[0]) > _BROKEN_NS)
+    lost = frames.drifted[:, 1:3].max(axis=1) > _BROKEN_M**2
+    lost[0] = False
+    return np.asarray(gaps[frames.index] + np.cumsum(lost))
+
+
+def _allowed(ends: Sequence[_End], placed: Sequence[Placed], adrift: Sequence[bool]) -> npt.NDArray[np.bool_]:
     """(n, n)."""
     number = np.array([end.number for end in ends])
     way_m = np.array([end.frames.travelled_m[end.key] for end in ends])
     blind = np.array([one.fixes is None for one in placed])[number]
     own = number[:, None] == number[None]
-    far = np.abs(way_m[:, None] - way_m[None]) > config.closures.apart_m
+    piece = np.array([_pieces(end.session, end.frames)[end.key] for end in ends])
+    far = (np.abs(way_m[:, None] - way_m[None]) > _SEEN_M) | (piece[:, None] != piece[None])
     allowed: npt.NDArray[np.bool_] = np.where(own, far & np.array(adrift)[number], blind[:, None] | blind[None])
     return allowed
 

@@ -33,6 +33,8 @@ _PLACES, _POSES = 6, 8
 _ROUNDS = 4
 _MET = 0.7
 """Of the stems that should be met, so many are."""
+_LEVEL_M = 0.3
+"""Within this the rises of stems from one ground to the other are the same."""
 _SPAN = 1 << 12
 Rows = npt.NDArray[np.int64]
 
@@ -166,7 +168,15 @@ def _judged(
     by_chance = 1.0 - math.exp(-len(there) / area_m2 * math.pi * config.met_m**2)
     hits, misses = int(met.sum()), int(asked.sum() - met.sum())
     nats = hits * math.log(_MET / by_chance) + misses * math.log((1.0 - _MET) / (1.0 - by_chance))
-    return Recognised(*numbers, turn, np.append(shift, np.median(rises)), hits, hits + misses, nats)
+    return Recognised(*numbers, turn, np.append(shift, _mostly(rises)), hits, hits + misses, nats)
+
+
+def _mostly(rises_m: Array) -> float:
+    """Where most of them lie together: under the rim of what a walk shows, half of the ground is a guess."""
+    ordered = np.sort(rises_m)
+    ends = np.searchsorted(ordered, ordered + _LEVEL_M, side="right")
+    first = int(np.argmax(ends - np.arange(len(ordered))))
+    return float(ordered[first : ends[first]].mean())
 
 
 def _with_rival(judged: Sequence[Recognised], here: Place, config: RecognitionConfig) -> Recognised:
