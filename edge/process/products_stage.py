@@ -19,6 +19,7 @@ from edge.process.detections_file import DetectionFacts
 from edge.process.finding_files import PICTURES, keep_verified, write_finding_files
 from edge.process.findings import read_grounding
 from edge.process.fusion_stage import FusionFacts, read_placement
+from edge.process.moving_stage import read_moved
 from edge.process.odometry_stage import OdometryFacts, read_fixes
 from edge.process.places import Places
 from edge.process.product_facts import PRODUCTS_JSON, REPORT, Georeference, ProductFacts, Shelf, whole
@@ -170,7 +171,10 @@ class ProductsStage:
             self.session,
             walk.survey.geoid.words,
             self.findings.evidence if self.findings is not None else None,
+            moved=read_moved(self.places.moved),
         )
+        if source.moved is not None and (count := sum(int(mask.sum()) for mask in source.moved.values())):
+            shelf.facts.notes += (f"{count:,} points of what moved are left out of the map (refinement.moving)",)
         name = "map_local.laz" if walk.survey.site is None else "map.laz"
         with shelf.put(name, f"points in {shelf.facts.crs}") as path:
             shelf.facts.points = write_laz(path, [source], advance)

@@ -15,6 +15,7 @@ from edge.config import Config
 from edge.errors import EdgeError, FormatError
 from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
 from edge.process.estimators import Estimators, estimators
+from edge.process.moving_stage import MOVED, find_moved
 from edge.process.places import Places
 from edge.process.process import ANTENNA, Task, ground, hand_out, process
 from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
@@ -95,7 +96,8 @@ class Work:
     def places(self) -> Places:
         """The placement and what follows from it are ours."""
         theirs, ours = self.first.folder, self.checkpoint.folder
-        return Places(theirs / "odometry", self.placement, theirs / "detection", ours / self._named("grounding"))
+        moved = ours / self._named("moving") / MOVED if self.config.refinement.moving.enabled else None
+        return Places(theirs / "odometry", self.placement, theirs / "detection", ours / self._named("grounding"), moved)
 
     def given(self) -> Given:
         """As the graph wants it."""
@@ -112,7 +114,10 @@ class Work:
         if detection:
             detection = key_of(key, detection, self.config.grounding)
             redone += self.stage(self._named("grounding"), detection, self._grounding)
-        last = key_of(key, detection, self.config.products, self.task.session)
+        moving = key_of(key, self.config.refinement.moving)
+        if self.config.refinement.moving.enabled:
+            redone += self.stage(self._named("moving"), moving, self._moving)
+        last = key_of(moving, detection, self.config.products, self.task.session)
         redone += self.stage(self._named("products"), last, self._products, self.output / PRODUCTS_JSON)
         return redone
 
@@ -131,6 +136,10 @@ class Work:
 
     def _grounding(self, folder: Path) -> None:
         ground(self.task, self.config, self.places, folder, self.watch.advance)
+
+    def _moving(self, folder: Path) -> None:
+        voxel_m, config = self.config.products.voxel_m, self.config.refinement.moving
+        find_moved(self.places, voxel_m, config, folder, self.watch.advance)
 
     def _products(self, _folder: Path) -> None:
         hand_out(self.task, self.config, self.places, self.output, self.watch.advance)

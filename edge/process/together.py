@@ -15,6 +15,7 @@ from edge.errors import EdgeError
 from edge.process import fusion_stage, odometry_stage
 from edge.process.checkpoint import Checkpoint, alone, key_of
 from edge.process.estimators import Estimators, estimators
+from edge.process.moving_stage import read_moved
 from edge.process.process import Task, process
 from edge.process.product_facts import read_facts, whole
 from edge.process.refine import FOLDER, Refined, Work, constraints_of, told
@@ -168,6 +169,7 @@ class _Site:
             facts.georeference.heights if facts.georeference is not None else "",
             findings.evidence if findings is not None else None,
             self.works.index(work) + 1,
+            read_moved(work.places.moved),
         )
 
     def _findings(self, work: Work) -> Findings | None:

@@ -96,6 +96,22 @@ class RecognitionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
         return math.radians(self.rival_deg)
 
 
+class MovingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What moved, taken out of the map."""
+
+    enabled: bool = True
+    stays_s: Positive = 2.0
+    """In a cell of 0.1 m, at most."""
+    apart_s: Positive = 0.5
+    """Rays so long before or after tell what was there at another time."""
+    rays: Annotated[int, msgspec.Meta(ge=1)] = 6
+    moments: Annotated[int, msgspec.Meta(ge=1)] = 3
+    """So many of them, at so many different times, must have passed a cell; and no more than hit it in between."""
+    least_cells: Annotated[int, msgspec.Meta(ge=1)] = 20
+    least_height_m: Positive = 0.5
+    """Such cells that touch make something that moved if there are as many, and it is so high."""
+
+
 class RefinementConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """All of it."""
 
@@ -103,3 +119,4 @@ class RefinementConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gnss: GnssConfig = GnssConfig()
     closures: ClosureConfig = ClosureConfig()
     recognition: RecognitionConfig = RecognitionConfig()
+    moving: MovingConfig = MovingConfig()
