@@ -22,8 +22,8 @@ from pipeline.refinement.submaps import REACH_M
 
 _ADRIFT_M = 150.0
 """Of way without a fix, after which a session may be anywhere."""
-_BROKEN_NS, _BROKEN_M = 5_000_000_000, 1.0
-"""Time without a pose, and drift of one step, after which the odometry does not know where it is."""
+_BROKEN_NS = 5_000_000_000
+"""Time without a pose."""
 _SEEN_M = 2.0 * REACH_M
 """Of way: places nearer than that see the same trees without having come back."""
 
@@ -84,9 +84,7 @@ def _pieces(session: Session, frames: Keyframes) -> npt.NDArray[np.int64]:
     """(m,) how often the odometry was lost before each keyframe."""
     stamps = session.track["stamp_ns"].astype(np.int64)
     gaps = np.cumsum(np.diff(stamps, prepend=stamps[0]) > _BROKEN_NS)
-    lost = frames.drifted[:, 1:3].max(axis=1) > _BROKEN_M**2
-    lost[0] = False
-    return np.asarray(gaps[frames.index] + np.cumsum(lost))
+    return np.asarray(gaps[frames.index] + np.searchsorted(frames.lost, np.arange(len(frames)), side="right"))
 
 
 def _allowed(ends: Sequence[_End], placed: Sequence[Placed], adrift: Sequence[bool]) -> npt.NDArray[np.bool_]:
