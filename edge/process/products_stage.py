@@ -181,8 +181,9 @@ class ProductsStage:
 
 
 def _origin(walk: Walk) -> str:
-    start = "the start, heading arbitrary"
-    return start if walk.placement is None else f"{start}, on the refined way (`local`): no coordinate system is named"
+    if walk.placement is None:
+        return "the start, heading arbitrary"
+    return "the start (of several sessions: of the first), refined, heading arbitrary; no coordinate system is named"
 
 
 def _georeference(site: Site, geoid: Geoid) -> Georeference:

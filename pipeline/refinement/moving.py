@@ -31,6 +31,8 @@ RAYS = 1_500_000
 """Through one region, at most: each n-th of more."""
 _BELOW_M, _ABOVE_M = 3.0, 1.5
 """Of the sensor: what moves is not higher, and crowns do move."""
+_FARTHEST_M = 15.0
+"""From the way: beyond, points are too few to tell."""
 _RAY = np.dtype([("xyz", "<f4", 3), ("sweep", "<u4"), ("ordinal", "<u4")])
 Mask = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int32]
@@ -54,8 +56,8 @@ def moved(
     time, with the rays that cross it."""
     counts = dict(_sorted_out(seen, work))
     out = np.zeros(sum(counts.values()), np.bool_)
-    regions = sorted(_number(path) for path in work.glob("*.rays"))
     walk = _Walk(seen)
+    regions = sorted(region for region in map(_number, work.glob("*.rays")) if walk.near(region))
     for k, region in enumerate(regions):
         out[_of_region(region, work, walk, config)] = True
         advance((k + 1) / len(regions))
@@ -73,6 +75,11 @@ class _Walk:
         self.begins = np.array([one.first for one in seen.submaps], np.int64)
         self._submaps, self._placement = seen.submaps, seen.placement
         self._middles = self.places_m[[one.middle for one in seen.submaps]]
+
+    def near(self, region: Tile) -> bool:
+        """Whether the sensor came so near that it would tell what moves there."""
+        away = np.abs(self.places_m[:, :2] - (np.array(region) + 0.5) * REGION_M).max(axis=1)
+        return bool(away.min() < 0.5 * REGION_M + _FARTHEST_M)
 
     def around(self, low: Array, high: Array) -> Iterator[tuple[int, Array]]:
         """Submaps by number, and their points (n, 3), of which some may lie in a box."""
