@@ -114,10 +114,9 @@ class Work:
         if detection:
             detection = key_of(key, detection, self.config.grounding)
             redone += self.stage(self._named("grounding"), detection, self._grounding)
-        moving = key_of(key, self.config.refinement.moving)
         if self.config.refinement.moving.enabled:
-            redone += self.stage(self._named("moving"), moving, self._moving)
-        last = key_of(moving, detection, self.config.products, self.task.session)
+            redone += self.stage(self._named("moving"), key, self._moving)
+        last = key_of(key, detection, self.config.products, self.task.session)
         redone += self.stage(self._named("products"), last, self._products, self.output / PRODUCTS_JSON)
         return redone
 
