@@ -20,7 +20,7 @@ from pipeline.refinement.solver import Solution
 from pipeline.refinement.starts import levelled, pose_of, turned_round
 
 FORBIDDEN, BY_HAND = "forbidden by the constraints", "accepted by the constraints"
-Place = tuple[int, int, bytes]
+Placing = tuple[int, int, bytes]
 """Two submaps, and where the one is looked for from the other."""
 _CLOUDS = 40
 """Submaps that wait in memory, 2 MB each."""
@@ -46,7 +46,7 @@ class Verdict:
 class Closing:
     """The submaps of all sessions, against their trajectories so far. known: registered before; added to."""
 
-    def __init__(self, problem: Problem, solved: Solution, known: dict[Place, Registered]) -> None:
+    def __init__(self, problem: Problem, solved: Solution, known: dict[Placing, Registered]) -> None:
         self._submaps = [submap for session in problem.sessions for submap in session.submaps]
         self._solved, self._names = solved, problem.names
         self._config, self._asked = problem.config.closures, problem.constraints

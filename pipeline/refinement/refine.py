@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.refinement.closing import Closing, Place, Verdict
+from pipeline.refinement.closing import Closing, Placing, Verdict
 from pipeline.refinement.constraints import check
 from pipeline.refinement.proposals import proposals
 from pipeline.refinement.registration import Registered
@@ -80,7 +80,7 @@ def _together(problem: Problem, advance: Callable[[float], None]) -> Refined:
         return Refined(problem, first, first)
     if not any(session.submaps for session in problem.sessions):
         return Refined(problem, first, first, notes=("there are no submaps: no loops were looked for",))
-    verdicts, known = list[Verdict](), dict[Place, Registered]()
+    verdicts, known = list[Verdict](), dict[Placing, Registered]()
     for k in range(ROUNDS):
         told = _Share(advance, _SOLVING + k * (1.0 - _SOLVING) / ROUNDS, (1.0 - _SOLVING) / ROUNDS)
         verdicts = Closing(problem, solved, known).verdicts(told)

@@ -193,6 +193,15 @@ def test_points_of_several_sessions_tell_which_they_are_of(tmp_path):
     assert b"walk (point source 1), walk (point source 2)" in (tmp_path / "map.laz").read_bytes()
 
 
+def test_points_of_what_moved_are_left_out(tmp_path):
+    plain = source(tmp_path / "tiles", None)
+    masks = {tile: read_tile(plain.tiles, tile, 0.05)["sweep"] == 1 for tile in tiles(plain.tiles)}
+    count = write_laz(tmp_path / "map.laz", [replace(plain, moved=masks)], lambda _: None)
+    read = laspy.read(tmp_path / "map.laz")
+    assert set(read.sweep) == {0, 2}
+    assert count == len(read.points) == sum(int((~mask).sum()) for mask in masks.values())
+
+
 def test_a_local_map_has_no_crs_and_says_why(tmp_path):
     write_laz(tmp_path / "map.laz", [source(tmp_path / "tiles", None)], lambda _: None)
     read = laspy.read(tmp_path / "map.laz")
