@@ -30,7 +30,7 @@ from pipeline.refinement.config import ChainConfig, GnssConfig, RefinementConfig
 from pipeline.refinement.refine import refine
 from pipeline.refinement.session import Problem, Session
 from pipeline.refinement.solver import Solution
-from pipeline.refinement.spread import corrected, placement
+from pipeline.refinement.spread import placement
 
 SQUARED = RefinementConfig(ChainConfig(drift_scales=(1.0,)), GnssConfig(kernel="squared", gate=0.0, learn=False))
 HUBER = RefinementConfig(ChainConfig(drift_scales=(1.0,)), GnssConfig(gate=0.0, learn=False))
@@ -110,10 +110,10 @@ def run(name: str, seed: int, cache: Path, rows: Sequence[Row]) -> Iterator[Resu
 def errors_m(track: np.ndarray, solved: Solution, walk: Walk, start: Array) -> Array:
     """Of every `EVERY`-th pose; by the true pose at the start where there is no `map`. start: (3, 3) of its heading."""
     truth, placed = walk.odometry.truth_m[::EVERY], placement(track, solved)
-    if placed is None:
-        places, _ = corrected(track, solved)
+    places, _ = placed.poses(track)
+    if placed.datum is None:
         return np.linalg.norm((places[::EVERY] - places[0]) @ start.T + truth[0] - truth, axis=1)
-    datum, (places, _) = Datum(*placed.datum), placed.poses(track)
+    datum = Datum(*placed.datum)
     found = np.array([walk.datum.enu(*datum.geodetic(place)) for place in places[::EVERY]])
     return np.asarray(np.linalg.norm(found - truth, axis=1))
 

@@ -105,7 +105,7 @@ def _of_stages(target: Path, folder: Path, session: Session, odometry: Path, con
     source = TileMap(odometry / odometry_stage.TILES, voxel_m, track["position_m"], placement, session.name)
     grounded, detected = places.grounding / trees_file.TREES, None
     if grounded.exists():
-        frame = "odom" if placement is None else "map"
+        frame = "odom" if placement is None else placement.frame
         trees = read_trees(grounded)
         detected = [tree for tree in trees if tree.frame == frame]
         if len(detected) < len(trees):

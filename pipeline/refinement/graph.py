@@ -28,16 +28,20 @@ _PROBABILITY = 0.99
 class Graph:
     """Factors between keyframes. `solve` remembers what it found: covariances and evidence are those at that place."""
 
-    def __init__(self, frames: Keyframes, level_rad: float) -> None:
+    def __init__(self, frames: Keyframes, level_rad: float, start: Poses) -> None:
         self._graph = gtsam.NonlinearFactorGraph()
         self._frames = frames
         self._fixes: tuple[Fixes, Judged] | None = None
         self._found = gtsam.Values()
         poses = [_pose(r, p) for r, p in zip(frames.rotations, frames.positions_m, strict=True)]
         covariances = frames.step_covariances()
+        lost = set(frames.lost.tolist())
         for k in frames.steps.tolist():
             model = gtsam.noiseModel.Gaussian.Covariance(covariances[k])
-            self._graph.add(gtsam.BetweenFactorPose3(k - 1, k, poses[k - 1].between(poses[k]), model))
+            step = poses[k - 1].between(poses[k])
+            if k in lost:  # there is no better word on this step than where the parts were put
+                step = _of(start, k - 1).between(_of(start, k))
+            self._graph.add(gtsam.BetweenFactorPose3(k - 1, k, step, model))
         level, up = gtsam.noiseModel.Isotropic.Sigma(2, level_rad), gtsam.Unit3(np.array([0.0, 0.0, 1.0]))
         for k, rotation in enumerate(frames.rotations):
             self._graph.add(gtsam.AttitudeFactorPose3(k, up, level, gtsam.Unit3(rotation[2])))
@@ -128,6 +132,10 @@ def _closure(one: Closure) -> gtsam.BetweenFactorPose3:
 
 def _pose(rotation: Array, position_m: Array) -> gtsam.Pose3:
     return gtsam.Pose3(gtsam.Rot3(rotation), position_m)
+
+
+def _of(poses: Poses, k: int) -> gtsam.Pose3:
+    return _pose(poses.rotations[k], poses.positions_m[k])
 
 
 def _values(poses: Poses) -> gtsam.Values:

@@ -15,6 +15,10 @@ from pipeline.refinement.config import ChainConfig
 from pipeline.refinement.errors import NothingToRefine
 
 _LEAST_STEP_M = 0.2
+_LOSING_M = 1.0
+_LOST = np.array([0.5, 10.0, 10.0, 10.0]) ** 2
+"""Variances, as `drifted`, of an odometry that has lost its place: with more, the equations without GNSS cannot be
+solved any more, and what ties the parts together outweighs this anyway."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +55,12 @@ class Keyframes:
     def seconds(self) -> Array:
         """(m,) since the first pose of each one's session."""
         return np.asarray((self.stamps_ns - self.stamps_ns[self.begins][self.session]) / 1e9)
+
+    @property
+    def lost(self) -> npt.NDArray[np.int64]:
+        """Of the steps, those on which the odometry lost its place: the parts before and after do not hang together."""
+        steps = self.steps
+        return np.asarray(steps[self.drifted[steps, 1:3].max(axis=1, initial=0.0) > _LOSING_M**2])
 
     def step_covariances(self) -> Array:
         """(m, 6, 6) of each pose as seen from the one before: rotation (rad), then position (m), both in the body's
@@ -160,7 +170,8 @@ def _drifted(chosen: npt.NDArray[np.void], config: ChainConfig) -> Array:
         carry = np.eye(4)
         carry[1, 0], carry[2, 0] = -moved[1], moved[0]
         grown = np.diag(known[k + 1] - carry @ known[k] @ carry.T)
-        drifted[k + 1] = np.maximum(grown, floor * max(float(np.linalg.norm(moved)), _LEAST_STEP_M))
+        least = floor * max(float(np.linalg.norm(moved)), _LEAST_STEP_M)
+        drifted[k + 1] = np.clip(grown, least, _LOST)
     return drifted
 
 

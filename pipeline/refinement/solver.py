@@ -122,7 +122,7 @@ class Solver:
         return graph.evidence() - frames.log_spread + log_norm(fixes, judged)
 
     def _graph(self, frames: Keyframes, closures: Sequence[Closure]) -> Graph:
-        graph = Graph(frames, math.radians(self._config.chain.level_deg))
+        graph = Graph(frames, math.radians(self._config.chain.level_deg), self._start)
         graph.hold_first(self._start, firmly=self._fixes is None)
         graph.add_closures(closures)
         for pin in self._pins:

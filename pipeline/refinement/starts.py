@@ -20,7 +20,8 @@ from pipeline.refinement.session import Placed, Problem, about_vertical
 def starts(problem: Problem, placed: Sequence[Placed]) -> Poses:
     """All keyframes in one frame: `map` of the first session with fixes, or `odom` of the first.
 
-    A session without fixes lies where a `[[closure]]` has it, or else where its `odom` begins.
+    A session without fixes lies where a `[[closure]]` has it, or stems that were known again, or else where its `odom`
+    begins.
     """
     datum = next((one.fixes.datum for one in placed if one.fixes is not None), None)
     found = {k: _moved(one, datum) for k, one in enumerate(placed) if one.fixes is not None and datum is not None}
@@ -31,12 +32,35 @@ def starts(problem: Problem, placed: Sequence[Placed]) -> Poses:
             for known, other, pose in ((a, b, guess), (b, a, turned_round(guess))):
                 if known in found and other not in found:
                     found[other] = _hung(placed[known].frames, found[known], placed[other], pose)
-    ways = [found.get(k, one.start) for k, one in enumerate(placed)]
+    ways = [_put_together(problem, k, found.get(k, one.start), one.frames) for k, one in enumerate(placed)]
     return Poses(np.concatenate([w.positions_m for w in ways]), np.concatenate([w.rotations for w in ways]))
 
 
+def _put_together(problem: Problem, number: int, way: Poses, frames: Keyframes) -> Poses:
+    """One session, what follows a lost place put where stems were known again that the most other places confirm."""
+    name = problem.names[number]
+    own = [one for one in problem.recognised if one.confirmed and (one.guess.a, one.guess.b) == (name, name)]
+    for k in frames.lost.tolist() if own else ():
+        ends = [(one, _at(frames, one.guess.a_s), _at(frames, one.guess.b_s)) for one in own]
+        across = [(one.confirmed, one.guess, a, b) for one, a, b in ends if min(a, b) < k <= max(a, b)]
+        if not across:
+            continue
+        _, guess, a, b = max(across, key=lambda end: end[0])
+        if a > b:
+            guess, a, b = turned_round(guess), b, a
+        known, moved = (levelled(way.rotations[end], way.positions_m[end]) for end in (a, b))
+        put = known @ pose_of(guess) @ np.linalg.inv(moved)
+        there = way.turned(put[:3, :3], put[:3, 3])
+        later = np.arange(len(frames)) >= k
+        way = Poses(
+            np.where(later[:, None], there.positions_m, way.positions_m),
+            np.where(later[:, None, None], there.rotations, way.rotations),
+        )
+    return way
+
+
 def groups(problem: Problem, placed: Sequence[Placed]) -> list[list[int]]:
-    """Sessions that come near each other by their fixes, or are joined by a `[[closure]]`; the largest group first."""
+    """Sessions that come near each other by their fixes, or that a `[[closure]]` or stems join; the largest first."""
     pairs = {(a, b) for a, b, _ in _guesses(problem)}
     on_earth = {k: one for k, one in enumerate(placed) if one.fixes is not None}
     for b, later in on_earth.items():
@@ -77,7 +101,9 @@ def levelled(rotation: Array, position_m: Array) -> Array:
 
 
 def _guesses(problem: Problem) -> Iterator[tuple[int, int, Guess]]:
-    for guess in problem.constraints.closure:
+    """Between sessions: the analyst's, then those by stems that the most others confirm."""
+    known = sorted(problem.recognised, key=lambda one: -one.confirmed)
+    for guess in (*problem.constraints.closure, *(one.guess for one in known if one.confirmed)):
         a, b = number_of(guess.a, problem.names), number_of(guess.b, problem.names)
         if a != b:
             yield a, b, guess

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -12,8 +14,10 @@ from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.geodesy import Datum
 from pipeline.refinement.closure import Closure
 from pipeline.refinement.config import ChainConfig, GnssConfig, RefinementConfig
-from pipeline.refinement.constraints import Constraints, Pin, Stretch
+from pipeline.refinement.constraints import Constraints, Guess, Pin, Stretch
 from pipeline.refinement.errors import ConstraintsRefused, NothingToRefine
+from pipeline.refinement.keyframes import keyframes
+from pipeline.refinement.recognition import Proposal, Recognised
 from pipeline.refinement.session import Problem, Session
 from pipeline.refinement.solver import Solver
 from pipeline.refinement.spread import placement
@@ -125,6 +129,27 @@ def gap_m(positions_m, frames, way):
     a, b = 30, 108
     true = np.linalg.norm(way[1][frames.index[a]] - way[1][frames.index[b]])
     return abs(np.linalg.norm(positions_m[a] - positions_m[b]) - true)
+
+
+def test_a_way_whose_odometry_was_lost_is_put_together_by_what_was_known_again():
+    way = walks.circle(laps=2.0)
+    track = walks.odometry(*way)
+    late = np.arange(len(track)) >= len(track) // 2
+    turn = walks.turned(2.0)
+    track["position_m"][late] = track["position_m"][late] @ turn.T + [60.0, -35.0, 0.5]
+    track["rotation"][late] = turn @ track["rotation"][late]
+    track["covariance"][late] += np.diag([900.0] * 3 + [0.0, 0.0, 4.0])
+    lost = problem(track, [], WHITE, ONE_DRIFT)
+    frames = keyframes(track, ONE_DRIFT.chain)
+    assert gap_m(Solver(lost).solve().poses.positions_m, frames, way) > 20.0
+    claims = [claim(frames, way, a, b) for a, b in ((2, 80), (20, 98), (40, 118))]
+    x_m, y_m, z_m = claims[0].pose[:3, 3].tolist()
+    yaw_deg = float(np.degrees(np.arctan2(claims[0].pose[1, 0], claims[0].pose[0, 0])))
+    guess = Guess(float(frames.seconds[2]), float(frames.seconds[80]), x_m, y_m, z_m, yaw_deg)
+    known = Proposal(guess, Recognised(0, 1, 0.0, np.zeros(3), 20, 25, 60.0), confirmed=1)
+    solved = Solver(replace(lost, recognised=(known,))).solve(claims)
+    assert len(solved.closures) == 3
+    assert gap_m(solved.poses.positions_m, frames, way) < 0.3
 
 
 def test_a_pin_holds_its_point_and_dropped_fixes_are_gone():
