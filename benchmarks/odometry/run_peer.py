@@ -116,6 +116,7 @@ def kiss_slam(data, threads):
 
     config = load_config(None)
     config.odometry.registration.max_num_threads = threads
+    config.local_mapper.splitting_distance = 30.0  # as the crow flies; by default 100 m, and short walks have no loops
     slam, rows = KissSLAM(config), []
     for start, xyz, offset in _sweeps(data):
         begun = time.process_time()
