@@ -32,7 +32,7 @@ from pipeline.refinement.config import ChainConfig, GnssConfig, RefinementConfig
 from pipeline.refinement.refine import refine
 from pipeline.refinement.session import Problem, Session
 from pipeline.refinement.solver import Solution
-from pipeline.refinement.spread import corrected, placement
+from pipeline.refinement.spread import placement
 
 SQUARED = RefinementConfig(ChainConfig(drift_scales=(1.0,)), GnssConfig(kernel="squared", gate=0.0, learn=False))
 HUBER = RefinementConfig(ChainConfig(drift_scales=(1.0,)), GnssConfig(gate=0.0, learn=False))
@@ -120,11 +120,11 @@ def alone(walk: Walk) -> Errors:
 def errors(track: np.ndarray, solved: Solution, walk: Walk, start: Array) -> Errors:
     """Of every `EVERY`-th pose; by the true pose at the start where there is no `map`. start: (3, 3) of its heading."""
     truth, without, placed = walk.odometry.truth_m[::EVERY], walk.odometry.alone_m[::EVERY], placement(track, solved)
-    if placed is None:
-        places, _ = corrected(track, solved)
+    places, _ = placed.poses(track)
+    if placed.datum is None:
         size = np.linalg.norm((places[::EVERY] - places[0]) @ start.T + truth[0] - truth, axis=1)
         return Errors(size, without, 0.0)
-    datum, (places, _) = Datum(*placed.datum), placed.poses(track)
+    datum = Datum(*placed.datum)
     away = np.array([walk.datum.enu(*datum.geodetic(place)) for place in places[::EVERY]]) - truth
     squared = normalised_square(away, placed.covariance[::EVERY, :3, :3])
     return Errors(np.linalg.norm(away, axis=1), without, float(squared.mean() / 3.0))

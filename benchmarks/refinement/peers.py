@@ -35,7 +35,7 @@ from pipeline.products.track import record_of
 from pipeline.refinement.config import RefinementConfig
 from pipeline.refinement.refine import refine
 from pipeline.refinement.session import Problem, Session
-from pipeline.refinement.spread import corrected
+from pipeline.refinement.spread import placement
 
 TRUTH, REFINED = "truth", "refined"
 SYSTEMS = ("ours", REFINED, "rko_lio", "kiss_slam")
@@ -139,7 +139,7 @@ def _refined(one: Walk, config: WorldConfig, options: argparse.Namespace) -> Way
     submaps = submaps_of(one, odometry.estimates)
     begun = time.process_time()
     (found,) = refine(Problem((Session(track, [], FusionConfig(), submaps),), RefinementConfig()))
-    positions, rotations = corrected(track, found.solution)
+    positions, rotations = placement(track, found.solution).poses(track)
     took = 1e3 * (time.process_time() - begun) / len(track)
     poses = Trajectory(track["stamp_ns"].astype(np.int64) + EPOCH_NS, positions, rotations)
     note = f"{len(found.solution.closures)} of {len(found.verdicts)} closures"

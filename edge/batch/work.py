@@ -74,4 +74,4 @@ def _report(task: Task, config: Config, watch: Watch, *, refined: bool) -> tuple
 def _warning(facts: ProductFacts) -> str:
     if facts.estimates < 0.9 * facts.sweeps:
         return f"{facts.sweeps - facts.estimates} of {facts.sweeps} sweeps without an estimate"
-    return "not on the Earth: a local map" if facts.frame == "odom" else ""
+    return "not on the Earth: a local map" if facts.datum is None else ""

@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
             out.print(f"  {escape(note)}", highlight=False)
         for name, meaning in facts.files.items():
             out.print(f"  {escape(str(done.folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)
-    poor = facts.frame == "odom" and not args.no_gnss
+    poor = facts.datum is None and not args.no_gnss
     return exit_codes.WARNINGS if poor or facts.estimates < 0.9 * facts.sweeps else exit_codes.GOOD
 
 

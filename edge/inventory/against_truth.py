@@ -62,13 +62,12 @@ def _simulated(session: Path, truth: Path, measured: tuple[Array, Array, Array])
     """In the world's frame, with the error of the trajectory around each stem taken off."""
     products = products_folder(session)
     facts = read_facts(products)
-    placed = facts.datum is not None
     places, dbh, sigma = measured
     if facts.datum is not None:
         places = Site(facts.datum).from_utm(places)
     true = simulated_way(truth, facts)
     try:
-        said = read_tum(products / ("trajectory.tum" if placed else "trajectory_odom.tum")).within(true)
+        said = read_tum(products / facts.trajectory).within(true)
     except ValueError as error:
         raise FormatError(f"{products} against {truth}: {error}") from error
     true = true.at(said.stamps_ns)

@@ -56,7 +56,7 @@ def _of_stages(target: Path, products: Path, work: Path, config: Config) -> Foun
     source = TileMap(folder, config.products.voxel_m, track["position_m"], placement, name)
     grounded, detected, notes = work / "grounding" / trees_file.TREES, None, []
     if grounded.exists():
-        frame = "odom" if placement is None else "map"
+        frame = "odom" if placement is None else placement.frame
         trees = read_trees(grounded)
         detected = [tree for tree in trees if tree.frame == frame]
         if len(detected) < len(trees):

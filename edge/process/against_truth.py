@@ -48,6 +48,8 @@ def _of_session(target: Path, truth: Path, config: Config) -> Iterator[Pair]:
         offline = _in_map(offline.moved(here.turn, here.origin_m), goal)
     if offline is not None:
         yield _pair("map", offline, true)
+    if (folder / "trajectory_local.tum").exists():
+        yield _pair("local", read_tum(folder / "trajectory_local.tum"), true, IN_ODOM)
     yield _pair("odom", read_tum(folder / "trajectory_odom.tum"), true, IN_ODOM)
     if any(target.glob("*.mcap")):
         yield from _live(read_live_poses(target, config), goal, true, offline)

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraWay:
-    """track: of the odometry. placement: None for a session without a place on the Earth."""
+    """track: of the odometry. placement: None where nothing else tells of the session."""
 
     track: npt.NDArray[np.void]
     placement: Placement | None

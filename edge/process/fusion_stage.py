@@ -76,7 +76,7 @@ class FusionStage:
             if i % 500 == 0:
                 advance(_FIT_SHARE + (1.0 - _FIT_SHARE) * i / count)
         datum = (drift.datum.latitude_deg, drift.datum.longitude_deg, drift.datum.height_m)
-        write_placement(folder / PLACEMENT, Placement(datum, translation, yaw, covariance))
+        write_placement(folder / PLACEMENT, Placement.upright(datum, translation, yaw, covariance))
         facts.georeferenced, facts.datum, facts.notes = True, datum, drift.notes
         return facts
 
@@ -95,18 +95,17 @@ def write_placement(path: Path, placement: Placement) -> None:
     """As a numpy archive."""
     np.savez(
         path,
-        datum=np.array(placement.datum),
+        datum=np.array(placement.datum or ()),
         translation_m=placement.translation_m,
-        yaw_rad=placement.yaw_rad,
+        rotation=placement.rotation,
         covariance=placement.covariance,
     )
 
 
 def read_placement(path: Path) -> Placement | None:
-    """None where the session could not be placed."""
+    """None where nothing but the odometry tells of the session."""
     if not path.exists():
         return None
     with np.load(path) as found:
-        latitude, longitude, height = found["datum"].tolist()
-        datum = (latitude, longitude, height)
-        return Placement(datum, found["translation_m"], found["yaw_rad"], found["covariance"])
+        datum = tuple(found["datum"].tolist()) or None
+        return Placement(datum, found["translation_m"], found["rotation"], found["covariance"])

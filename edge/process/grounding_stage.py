@@ -42,13 +42,13 @@ class GroundingStage:
     config: GroundingConfig
 
     def run(self, folder: Path, advance: Callable[[float], None]) -> list[Tree]:
-        """Write trees and what was searched, in `map` where the session has a place there, else in `odom`; and the
+        """Write trees and what was searched, in the frame of the placement, else in `odom`; and the
         evidence by point of the odometry's map. Returns the trees."""
         started_s = time.monotonic()
         model, frames = read_detections(self.places.detection / DETECTIONS)
         target = self.config.target or (model.class_names[0] if model.class_names else "")
         placement = read_placement(self.places.fusion / fusion_stage.PLACEMENT)
-        facts = GroundingFacts(target, "odom" if placement is None else "map")
+        facts = GroundingFacts(target, "odom" if placement is None else placement.frame)
         if target not in model.class_names:
             known = ", ".join(model.class_names)
             facts.notes += (f"grounding.target {target!r}: the model {model.name} knows {known}; nothing was mapped",)

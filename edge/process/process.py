@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # heavy: OpenCV
 STAGES = ("odometry", "fusion", "detection", "grounding", "products")
 ANTENNA = "antenna.json"
 """Where the recording says the antenna is: the fusion does not open it again."""
-_FORMAT = 3
+_FORMAT = 4
 """Of the files between the stages."""
 
 

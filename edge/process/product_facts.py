@@ -57,7 +57,7 @@ class ProductFacts(msgspec.Struct):
 
     session: str
     frame: str
-    """`map` (ENU at the datum) or `odom` (local: from the start, heading arbitrary)."""
+    """`map` (ENU at the datum), `odom` (from the start, heading arbitrary), or `local` (that, refined)."""
     crs: str
     files: dict[str, str] = {}
     """Name -> what it is."""
@@ -80,6 +80,14 @@ class ProductFacts(msgspec.Struct):
     detection: DetectionFacts | None = None
     """None where no model was configured; so with the findings."""
     findings: FindingFacts | None = None
+
+    @property
+    def trajectory(self) -> str:
+        """The file with the poses in `frame`."""
+        return _TRAJECTORIES.get(self.frame, "trajectory_odom.tum")
+
+
+_TRAJECTORIES = {"map": "trajectory.tum", "local": "trajectory_local.tum"}
 
 
 def read_facts(folder: Path) -> ProductFacts:

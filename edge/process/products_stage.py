@@ -19,6 +19,7 @@ from edge.process.detections_file import DetectionFacts
 from edge.process.finding_files import PICTURES, keep_verified, write_finding_files
 from edge.process.findings import read_grounding
 from edge.process.fusion_stage import FusionFacts, read_placement
+from edge.process.moving_stage import read_moved
 from edge.process.odometry_stage import OdometryFacts, read_fixes
 from edge.process.places import Places
 from edge.process.product_facts import PRODUCTS_JSON, REPORT, Georeference, ProductFacts, Shelf, whole
@@ -35,6 +36,7 @@ from pipeline.products.track import Placement, read_track
 MADE = (
     "trajectory_odom.tum",
     "trajectory.tum",
+    "trajectory_local.tum",
     "trajectory.gpkg",
     "trajectory.kml",
     "covariance.csv",
@@ -106,8 +108,8 @@ class ProductsStage:
         positions, covariance, site = track["position_m"], track["covariance"], None
         if placement is not None:
             positions, _ = placement.poses(track)
-            covariance, site = placement.covariance, Site(placement.datum)
-        poses = pose_table("odom" if placement is None else "map", track, positions, covariance)
+            covariance, site = placement.covariance, Site(placement.datum) if placement.datum is not None else None
+        poses = pose_table("odom" if placement is None else placement.frame, track, positions, covariance)
         observer = self.config.observer or done.operator
         survey = Survey(
             self.session, observer, self.config.organization, track["stamp_ns"], positions, site, self._geoid(fixes)
@@ -126,7 +128,7 @@ class ProductsStage:
         if done.late_scans or done.late_samples:
             notes.append(f"{done.late_scans} sweeps and {done.late_samples} inertial samples came too late, left out")
         if site is None:
-            notes.append(f"not georeferenced: {fused.why}; positions are metres from the start, heading arbitrary")
+            notes.append(f"not georeferenced: {fused.why}; positions are metres from {_origin(walk)}")
         notes += fused.notes
         said = Counter(note.decode(errors="replace") for note in walk.track["note"] if note)
         notes += [f"{count} sweeps: {note}" for note, count in said.most_common(20)]
@@ -169,10 +171,18 @@ class ProductsStage:
             self.session,
             walk.survey.geoid.words,
             self.findings.evidence if self.findings is not None else None,
+            moved=read_moved(self.places.moved),
         )
-        name = "map_local.laz" if walk.placement is None else "map.laz"
+        if source.moved is not None and (count := sum(int(mask.sum()) for mask in source.moved.values())):
+            shelf.facts.notes += (f"{count:,} points of what moved are left out of the map (refinement.moving)",)
+        name = "map_local.laz" if walk.survey.site is None else "map.laz"
         with shelf.put(name, f"points in {shelf.facts.crs}") as path:
             shelf.facts.points = write_laz(path, [source], advance)
+
+
+def _origin(walk: Walk) -> str:
+    start = "the start, heading arbitrary"
+    return start if walk.placement is None else f"{start}, on the refined way (`local`): no coordinate system is named"
 
 
 def _georeference(site: Site, geoid: Geoid) -> Georeference:

@@ -15,6 +15,7 @@ from edge.config import Config
 from edge.errors import EdgeError, FormatError
 from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
 from edge.process.estimators import Estimators, estimators
+from edge.process.moving_stage import MOVED, find_moved
 from edge.process.places import Places
 from edge.process.process import ANTENNA, Task, ground, hand_out, process
 from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
@@ -30,7 +31,7 @@ FOLDER = "refined"
 """In the folder of the products."""
 CONSTRAINTS = "constraints.toml"
 """The analyst's, in that folder; read where it is there and no other is named."""
-_FORMAT = 2
+_FORMAT = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,8 @@ class Work:
     def places(self) -> Places:
         """The placement and what follows from it are ours."""
         theirs, ours = self.first.folder, self.checkpoint.folder
-        return Places(theirs / "odometry", self.placement, theirs / "detection", ours / self._named("grounding"))
+        moved = ours / self._named("moving") / MOVED if self.config.refinement.moving.enabled else None
+        return Places(theirs / "odometry", self.placement, theirs / "detection", ours / self._named("grounding"), moved)
 
     def given(self) -> Given:
         """As the graph wants it."""
@@ -104,7 +106,7 @@ class Work:
         antenna = msgspec.json.decode((self.places.odometry / ANTENNA).read_bytes(), type=tuple[float, float, float])
         fusion = msgspec.structs.replace(self.config.fusion, antenna_m=antenna)
         prints = tuple(fingerprint(recording_files(self.task.targets)))
-        return Given(self.task.session, prints, self.places.odometry, self.placement, self.output, fusion)
+        return Given(self.task.session, prints, self.places.odometry, self.placement, fusion)
 
     def rest(self, key: str) -> list[str]:
         """Grounding and products, of a placement with this key; the stages that had to be done."""
@@ -112,7 +114,10 @@ class Work:
         if detection:
             detection = key_of(key, detection, self.config.grounding)
             redone += self.stage(self._named("grounding"), detection, self._grounding)
-        last = key_of(key, detection, self.config.products, self.task.session)
+        moving = key_of(key, self.config.refinement.moving)
+        if self.config.refinement.moving.enabled:
+            redone += self.stage(self._named("moving"), moving, self._moving)
+        last = key_of(moving, detection, self.config.products, self.task.session)
         redone += self.stage(self._named("products"), last, self._products, self.output / PRODUCTS_JSON)
         return redone
 
@@ -131,6 +136,10 @@ class Work:
 
     def _grounding(self, folder: Path) -> None:
         ground(self.task, self.config, self.places, folder, self.watch.advance)
+
+    def _moving(self, folder: Path) -> None:
+        voxel_m, config = self.config.products.voxel_m, self.config.refinement.moving
+        find_moved(self.places, voxel_m, config, folder, self.watch.advance)
 
     def _products(self, _folder: Path) -> None:
         hand_out(self.task, self.config, self.places, self.output, self.watch.advance)

@@ -12,18 +12,17 @@ from edge.process.fusion_stage import FACTS, PLACEMENT, FusionFacts, write_place
 from edge.process.odometry_stage import FIXES, SUBMAPS, TRACK, read_fixes
 from pipeline.gnss.config import FusionConfig
 from pipeline.products.track import read_track
-from pipeline.products.tum import write_tum
 from pipeline.refinement.config import RefinementConfig
 from pipeline.refinement.constraints import Constraints
 from pipeline.refinement.page import write_page
 from pipeline.refinement.refine import Refined, refine
 from pipeline.refinement.session import Problem, Session
 from pipeline.refinement.solver import Solution
-from pipeline.refinement.spread import corrected, placement
+from pipeline.refinement.spread import placement
 from pipeline.refinement.submaps import read_submaps
 from pipeline.refinement.table import write_closures
 
-REFINEMENT, CLOSURES, PAGE, LOCAL = "refinement.json", "closures.csv", "refinement.html", "trajectory_refined.tum"
+REFINEMENT, CLOSURES, PAGE = "refinement.json", "closures.csv", "refinement.html"
 MADE = (REFINEMENT, CLOSURES, PAGE)
 
 
@@ -52,14 +51,12 @@ class RefinementFacts(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """One session: its recording's name and files, where its odometry lies, and where its placement goes; `own`: where
-    what is its own goes for people."""
+    """One session: its recording's name and files, where its odometry lies, and where its placement goes."""
 
     name: str
     recording: tuple[tuple[str, int, str], ...]
     odometry: Path
     placement: Path
-    own: Path
     fusion: FusionConfig
 
     def session(self) -> Session:
@@ -92,14 +89,9 @@ def write_refined(found: Refined, given: Sequence[Given], output: Path, software
 
 
 def _write_placement(one: Given, session: Session, solved: Solution) -> None:
-    fused = FusionFacts(fixes=len(session.fixes), why=_why_not(len(session.fixes)))
-    (one.own / LOCAL).unlink(missing_ok=True)
-    placed = placement(session.track, solved)
-    if placed is not None:
-        write_placement(one.placement / PLACEMENT, placed)
-        fused = FusionFacts(True, "", len(session.fixes), placed.datum)
-    else:
-        write_tum(one.own / LOCAL, session.track["stamp_ns"], *corrected(session.track, solved))
+    placed, fixes = placement(session.track, solved), len(session.fixes)
+    write_placement(one.placement / PLACEMENT, placed)
+    fused = FusionFacts(placed.datum is not None, "" if placed.datum else _why_not(fixes), fixes, placed.datum)
     (one.placement / FACTS).write_bytes(msgspec.json.encode(fused))
 
 

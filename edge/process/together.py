@@ -15,6 +15,7 @@ from edge.errors import EdgeError
 from edge.process import fusion_stage, odometry_stage
 from edge.process.checkpoint import Checkpoint, alone, key_of
 from edge.process.estimators import Estimators, estimators
+from edge.process.moving_stage import read_moved
 from edge.process.process import Task, process
 from edge.process.product_facts import read_facts, whole
 from edge.process.refine import FOLDER, Refined, Work, constraints_of, told
@@ -26,11 +27,11 @@ from pipeline.products.track import read_track
 from pipeline.refinement.constraints import Constraints
 
 MAP, GROUPS = "map.laz", "together.json"
-_FORMAT = 1
+_FORMAT = 2
 
 
 class Group(msgspec.Struct, frozen=True):
-    """Sessions that share one `map`, and the folder with the graph's page, list and facts."""
+    """Sessions that share one `map` or `local`, and the folder with the graph's page, list and facts."""
 
     sessions: tuple[str, ...]
     folder: str
@@ -110,7 +111,7 @@ class _Site:
         for work in self.works:
             redone += work.rest(key_of(key, work.name))
         last = key_of(key, [work.first.key("detection") for work in self.works], self.config.products)
-        maps = [self.output / group.folder / MAP for group in self.groups() if self._mapped(group)]
+        maps = [self.output / group.folder / MAP for group in self._shared()]
         redone += self.works[0].stage("map", last, lambda _: self._maps(), *maps)
         return redone
 
@@ -142,16 +143,12 @@ class _Site:
             for name in (*MADE, *((MAP,) if len(group.sessions) > 1 else ())):
                 (self.output / group.folder / name).unlink(missing_ok=True)
 
-    def _mapped(self, group: Group) -> bool:
-        """Whether there is one map of several sessions."""
-        first = next(work for work in self.works if work.name == group.sessions[0])
-        return (
-            len(group.sessions) > 1
-            and fusion_stage.read_placement(first.placement / fusion_stage.PLACEMENT) is not None
-        )
+    def _shared(self) -> list[Group]:
+        """Those with one map of several sessions."""
+        return [group for group in self.groups() if len(group.sessions) > 1]
 
     def _maps(self) -> None:
-        for group in filter(self._mapped, self.groups()):
+        for group in self._shared():
             sources = [self._source(work) for work in self.works if work.name in group.sessions]
             with whole(self.output / group.folder / MAP) as path:
                 write_laz(path, sources, self.watch.advance)
@@ -172,6 +169,7 @@ class _Site:
             facts.georeference.heights if facts.georeference is not None else "",
             findings.evidence if findings is not None else None,
             self.works.index(work) + 1,
+            read_moved(work.places.moved),
         )
 
     def _findings(self, work: Work) -> Findings | None:

@@ -90,9 +90,9 @@ class _Way:
 
     @classmethod
     def of(cls, products: Path, truth: Path, facts: ProductFacts) -> _Way:
-        turn, origin_m, name = np.eye(3), np.zeros(3), "trajectory_odom.tum"
+        turn, origin_m, name = np.eye(3), np.zeros(3), facts.trajectory
         if facts.datum is not None:
-            here, goal, name = Datum(*facts.datum), world_datum(truth), "trajectory.tum"
+            here, goal = Datum(*facts.datum), world_datum(truth)
             turn, origin_m = goal.turn.T @ here.turn, goal.turn.T @ (here.origin_m - goal.origin_m)
         true = simulated_way(truth, facts)
         try:

@@ -24,7 +24,7 @@ from pipeline.products.vector import add_styles, write_way
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Walk:
-    """Where the session went. poses: in `map` where there is a placement, in `odom` otherwise."""
+    """Where the session went. poses: in the frame of the placement, or in `odom`."""
 
     track: npt.NDArray[np.void]
     placement: Placement | None
@@ -38,6 +38,9 @@ def write_way_files(shelf: Shelf, walk: Walk) -> None:
     track, survey = walk.track, walk.survey
     with shelf.put("trajectory_odom.tum", "base_link in odom: smooth, drifts") as path:
         write_tum(path, track["stamp_ns"], track["position_m"], track["rotation"])
+    if walk.placement is not None and survey.site is None:
+        with shelf.put("trajectory_local.tum", "base_link in local: refined, metres from the start") as path:
+            write_tum(path, track["stamp_ns"], *walk.placement.poses(track))
     if walk.placement is not None and survey.site is not None:
         with shelf.put("trajectory.tum", "base_link in map: ENU at the datum") as path:
             write_tum(path, track["stamp_ns"], *walk.placement.poses(track))
@@ -83,7 +86,7 @@ def way_facts(walk: Walk) -> dict[str, str | float]:
 def _story(shelf: Shelf, walk: Walk) -> Story:
     facts = shelf.facts
     fixes_m = np.empty((0, 3))
-    if walk.placement is not None:
+    if walk.placement is not None and walk.placement.datum is not None:
         datum = Datum(*walk.placement.datum)
         fixes_m = np.array([datum.enu(fix.latitude_deg, fix.longitude_deg, fix.height_m) for fix in walk.fixes])
     shown = {

@@ -33,7 +33,7 @@ _FINDINGS = ("findings.gpkg", "findings_local.gpkg")
 class Made:
     """trees: rows of the layer `detections`. searched: rings (n, 2) on the plan. placed: the way in `map`, or None.
 
-    The plan is what is drawn from above: metres in the site's UTM grid from the datum, or `odom` of a local session.
+    The plan is what is drawn from above: metres in the site's UTM grid from the datum, or those of a local session.
     """
 
     folder: Path

@@ -1,4 +1,4 @@
-"""Trees taken from the frame of the odometry to `map`."""
+"""Trees taken from the frame of the odometry to that of the map."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ def _placed(tree: Tree, placement: Placement, stamps_ns: npt.NDArray[np.int64]) 
     middle_ns = (tree.first_ns + tree.last_ns) // 2
     sweep = min(int(np.searchsorted(stamps_ns, middle_ns)), len(stamps_ns) - 1)
     position = placement.points(tree.position_m[None], np.array([sweep]))[0]
-    c, s = np.cos(placement.yaw_rad[sweep]), np.sin(placement.yaw_rad[sweep])
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turn = placement.rotation[sweep]
     covariance = turn @ tree.covariance @ turn.T + placement.covariance[sweep, :3, :3]
-    return replace(tree, frame="map", position_m=position, covariance=covariance)
+    return replace(tree, frame=placement.frame, position_m=position, covariance=covariance)

@@ -19,14 +19,15 @@ Doubles = npt.NDArray[np.float64]
 
 
 class TileMap:
-    """In `map` where there is a placement, else in `odom`. positions_m: (k, 3) of each sweep in `odom`."""
+    """In the frame of the placement, else in `odom`. positions_m: (k, 3) of each sweep in `odom`."""
 
     def __init__(
         self, folder: Path, voxel_m: float, positions_m: Doubles, placement: Placement | None, name: str = ""
     ) -> None:
         self._folder, self.voxel_m, self._placement = folder, voxel_m, placement
         self.name = name or folder.name
-        self._site = Site(placement.datum) if placement is not None else None
+        datum = None if placement is None else placement.datum
+        self._site = Site(datum) if datum is not None else None
         self.crs: pyproj.CRS | None = self._site.crs if self._site is not None else None
         ordinals = np.arange(len(positions_m))
         self._sensor = positions_m if placement is None else placement.points(positions_m, ordinals)
@@ -40,7 +41,7 @@ class TileMap:
         self.bounds_m = np.array([low, high])
 
     def placed(self, xyz_m: Doubles) -> Doubles:
-        """(n, 3) in `map` or `odom` -> in the site's UTM zone, or as they are."""
+        """(n, 3) in the frame of the map -> in the site's UTM zone, or as they are."""
         return xyz_m if self._site is None else self._site.utm(xyz_m)
 
     def parts(self) -> Iterator[Part]:

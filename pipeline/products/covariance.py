@@ -17,8 +17,8 @@ HEADER = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseTable:
-    """n poses in `frame` (map or odom). positions_m: (n, 3). covariance: (n, 6, 6) of position, then rotation; of a
-    table that was read, the mixed terms of rotation are zero.
+    """n poses in `frame` (map, local or odom). positions_m: (n, 3). covariance: (n, 6, 6) of position, then rotation;
+    of a table that was read, the mixed terms of rotation are zero.
     """
 
     frame: str

@@ -43,7 +43,7 @@ Evidence = Callable[[Tile, npt.NDArray[np.void]], PointEvidence]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """frame: `map` or `odom`, of the trees and of the coverage. images: how many the detector looked at.
+    """frame: `map`, `local` or `odom`, of the trees and of the coverage. images: how many the detector looked at.
 
     chips: tree_id -> JPEG of its best view.
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipeline.products.earth import Site
 from pipeline.products.findings import Evidence, PointEvidence
-from pipeline.products.tiles import read_tile, tiles
+from pipeline.products.tiles import Tile, read_tile, tiles
 from pipeline.products.track import Placement
 
 SCALE_M = 0.001
@@ -53,18 +53,22 @@ class MapSource:
     """Of a detector: without it the points carry no heat, label and count."""
     number: int = 0
     """Of the session among several in one file: the point source ID."""
+    moved: Mapping[Tile, npt.NDArray[np.bool_]] | None = None
+    """Points of each tile that are left out, as the tile is read."""
 
 
 def write_laz(path: Path, sources: Sequence[MapSource], advance: Callable[[float], None]) -> int:
-    """Write to `path`; returns the number of points. One tile is in memory at a time. All sources have one datum."""
+    """Write to `path`; returns the number of points. One tile is in memory at a time. All sources have one frame."""
     found = [(source, tile) for source in sources for tile in tiles(source.tiles)]
     first = sources[0].placement
-    site = Site(first.datum) if first is not None else None
+    site = Site(first.datum) if first is not None and first.datum is not None else None
     count = 0
     header = _header(sources, site)
     with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
         for number, (source, tile) in enumerate(found):
             points = read_tile(source.tiles, tile, source.voxel_m)
+            if source.moved is not None:
+                points = points[~source.moved[tile]]
             told = source.evidence(tile, points) if source.evidence is not None and _with_evidence(sources) else None
             for start in range(0, len(points), _AT_ONCE):
                 some = slice(start, start + _AT_ONCE)
@@ -112,8 +116,10 @@ def _record(
 ) -> laspy.ScaleAwarePointRecord:
     sweeps = points["sweep"].astype(np.int64)
     xyz = points["xyz"].astype(np.float64)
-    if source.placement is not None and site is not None:
-        xyz = site.utm_nearby(source.placement.points(xyz, sweeps))
+    if source.placement is not None:
+        xyz = source.placement.points(xyz, sweeps)
+    if site is not None:
+        xyz = site.utm_nearby(xyz)
     record = laspy.ScaleAwarePointRecord.zeros(len(points), header=header)
     record.x, record.y, record.z = xyz.T
     record.intensity = points["intensity"].astype(np.uint16) * 257

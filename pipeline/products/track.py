@@ -91,29 +91,39 @@ def estimate_of(record: npt.NDArray[np.void] | np.void) -> OdometryEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """`odom` in `map` at each estimate of a track. datum: latitude, longitude (degrees), ellipsoidal height (m).
+    """`odom` at each estimate of a track in `map`, or in `local`: p = rotation @ p_odom + translation_m.
 
-    translation_m: (n, 3). yaw_rad: (n,). covariance: (n, 6, 6) of `base_link` in `map`: position, then rotation.
+    datum: latitude, longitude (degrees), ellipsoidal height (m) of the origin of `map`; None: nothing tells where on
+    the Earth it is, and the frame is `local`. translation_m: (n, 3). rotation: (n, 3, 3). covariance: (n, 6, 6) of
+    `base_link` there: position, then rotation.
     """
 
-    datum: tuple[float, float, float]
+    datum: tuple[float, float, float] | None
     translation_m: Array
-    yaw_rad: Array
+    rotation: Array
     covariance: Array
 
-    def points(self, odom_m: Array, sweeps: npt.NDArray[np.integer]) -> Array:
-        """(m, 3) points in `odom` -> in `map`, each by the placement of its sweep (m,)."""
-        cosine, sine = np.cos(self.yaw_rad)[sweeps], np.sin(self.yaw_rad)[sweeps]
-        x, y, z = odom_m[:, 0], odom_m[:, 1], odom_m[:, 2]
-        turned = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z])
-        return np.asarray(turned + self.translation_m[sweeps])
-
-    def poses(self, track: npt.NDArray[np.void]) -> tuple[Array, Array]:
-        """Positions (n, 3) and rotations (n, 3, 3) of a track in `map`."""
-        positions = self.points(track["position_m"], np.arange(len(track)))
-        turn = np.zeros((len(track), 3, 3))
-        turn[:, 0, 0] = turn[:, 1, 1] = np.cos(self.yaw_rad)
-        turn[:, 1, 0] = np.sin(self.yaw_rad)
+    @classmethod
+    def upright(
+        cls, datum: tuple[float, float, float] | None, translation_m: Array, yaw_rad: Array, covariance: Array
+    ) -> Placement:
+        """Of headings (n,) alone."""
+        turn = np.zeros((len(yaw_rad), 3, 3))
+        turn[:, 0, 0] = turn[:, 1, 1] = np.cos(yaw_rad)
+        turn[:, 1, 0] = np.sin(yaw_rad)
         turn[:, 0, 1] = -turn[:, 1, 0]
         turn[:, 2, 2] = 1.0
-        return positions, turn @ track["rotation"]
+        return cls(datum, translation_m, turn, covariance)
+
+    @property
+    def frame(self) -> str:
+        """`map` (ENU at the datum) or `local`."""
+        return "local" if self.datum is None else "map"
+
+    def points(self, odom_m: Array, sweeps: npt.NDArray[np.integer]) -> Array:
+        """(m, 3) points in `odom` -> in the frame, each by the placement of its sweep (m,)."""
+        return np.asarray(np.einsum("mij,mj->mi", self.rotation[sweeps], odom_m) + self.translation_m[sweeps])
+
+    def poses(self, track: npt.NDArray[np.void]) -> tuple[Array, Array]:
+        """Positions (n, 3) and rotations (n, 3, 3) of a track in the frame."""
+        return self.points(track["position_m"], np.arange(len(track))), self.rotation @ track["rotation"]

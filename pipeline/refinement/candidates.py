@@ -12,6 +12,7 @@ from pipeline.estimates import Array
 from pipeline.products.covariance import horizontal_sigma_m
 from pipeline.refinement.config import ClosureConfig
 from pipeline.refinement.keyframes import Keyframes, Poses
+from pipeline.refinement.recognition import Recognised
 from pipeline.refinement.submaps import Submap
 
 _SURE = 2.0
@@ -23,13 +24,21 @@ _DIRECTIONS = 6
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """Submaps a < b by number, those of all sessions counted on; sigma_m of where they lie to each other. guess: (4, 4)
-    of b from a, or None: as the trajectory has it."""
+    of b from a, or None: as the trajectory has it. recognised: by which stems."""
 
     a: int
     b: int
     apart_m: float
     sigma_m: float
     guess: Array | None = None
+    recognised: Recognised | None = None
+
+    @property
+    def origin(self) -> str:
+        """Where it came from, in a word."""
+        if self.recognised is not None:
+            return "stems"
+        return "way" if self.guess is None else "analyst"
 
 
 def candidates(

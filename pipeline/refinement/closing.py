@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.estimates import Array
+from pipeline.refinement.agreement import agree
 from pipeline.refinement.candidates import Candidate, candidates, guesses, keys_of
 from pipeline.refinement.closure import Closure
 from pipeline.refinement.constraints import Guess, Pair, number_of
+from pipeline.refinement.recognition import Recognised
 from pipeline.refinement.registration import Cloud, Registered, register
 from pipeline.refinement.session import Problem
 from pipeline.refinement.solver import Solution
 from pipeline.refinement.starts import levelled, pose_of, turned_round
 
 FORBIDDEN, BY_HAND = "forbidden by the constraints", "accepted by the constraints"
+Place = tuple[int, int, bytes]
+"""Two submaps, and where the one is looked for from the other."""
 _CLOUDS = 40
 """Submaps that wait in memory, 2 MB each."""
 
@@ -40,40 +44,55 @@ class Verdict:
 
 
 class Closing:
-    """The submaps of all sessions, against their trajectories so far."""
+    """The submaps of all sessions, against their trajectories so far. known: registered before; added to."""
 
-    def __init__(self, problem: Problem, solved: Solution) -> None:
+    def __init__(self, problem: Problem, solved: Solution, known: dict[Place, Registered]) -> None:
         self._submaps = [submap for session in problem.sessions for submap in session.submaps]
         self._solved, self._names = solved, problem.names
         self._config, self._asked = problem.config.closures, problem.constraints
+        self._recognised, self._known = problem.recognised, known
         self._keys = keys_of([session.submaps for session in problem.sessions], solved.frames)
         self._clouds: dict[int, Cloud] = {}
 
     def verdicts(self, advance: Callable[[float], None]) -> list[Verdict]:
         """Of all candidates, the analyst's among them."""
         solved = self._solved
-        found = list(candidates(self._keys, solved.frames, solved.poses, solved.covariance, self._config))
-        found += [self._guessed(guess) for guess in self._asked.closure]
+        near = candidates(self._keys, solved.frames, solved.poses, solved.covariance, self._config)
+        pairs = {(one.a, one.b): one for one in near}
+        for proposal in self._recognised:
+            one = self._guessed(proposal.guess, proposal.found)
+            if proposal.found.sure or (one.a, one.b) not in pairs:
+                pairs[one.a, one.b] = one
+        found = [*pairs.values(), *(self._guessed(guess) for guess in self._asked.closure)]
         judged = []
         for k, candidate in enumerate(found):
             judged.append(self._judge(candidate))
             advance((k + 1) / len(found))
-        return judged
+        return [self._confirmed(one, judged) for one in judged]
 
     def _judge(self, candidate: Candidate) -> Verdict:
         keys = (self._keys[candidate.a], self._keys[candidate.b])
         if self._named(candidate, self._asked.forbid):
             return Verdict(candidate, keys, FORBIDDEN)
+        known, by_hand = candidate.recognised, self._named(candidate, self._asked.accept)
+        if known is not None and not known.sure and not by_hand:
+            return Verdict(candidate, keys, f"ambiguous: a pose {known.rival_m:.1f} m away meets nearly as many stems")
         expected = (
             np.linalg.inv(self._pose(keys[0])) @ self._pose(keys[1]) if candidate.guess is None else candidate.guess
         )
-        around = guesses(expected, candidate.sigma_m)
-        found = register(self._cloud(candidate.a), self._cloud(candidate.b), around, self._config)
-        by_hand = self._named(candidate, self._asked.accept)
+        found = self._registered(candidate, expected)
         correction = found.pose @ np.linalg.inv(expected)
         reason = BY_HAND if by_hand else self._reason(found, keys, candidate)
         closure = Closure(*keys, found.pose, found.covariance, accepted=by_hand)
         return Verdict(candidate, keys, reason, closure, found, float(np.linalg.norm(correction[:3, 3])))
+
+    def _registered(self, candidate: Candidate, expected: Array) -> Registered:
+        """Once for each guess: that of stems or of the analyst stays what it is."""
+        place = (candidate.a, candidate.b, expected.tobytes())
+        if place not in self._known:
+            around = guesses(expected, candidate.sigma_m)
+            self._known[place] = register(self._cloud(candidate.a), self._cloud(candidate.b), around, self._config)
+        return self._known[place]
 
     def _reason(self, found: Registered, keys: tuple[int, int], candidate: Candidate) -> str:
         """Why not; empty when there is none."""
@@ -110,12 +129,35 @@ class Closing:
         spread[3, 3] += (own @ found.covariance @ own.T)[2, 2]
         return float(off @ np.linalg.solve(spread, off))
 
-    def _guessed(self, guess: Guess) -> Candidate:
+    def _confirmed(self, one: Verdict, judged: Sequence[Verdict]) -> Verdict:
+        """What stems alone speak for is not believed on the word of one place."""
+        if one.candidate.recognised is None or not one.sound or one.reason == BY_HAND:
+            return one
+        if any(self._agree(one, other) for other in judged if other.sound):
+            return one
+        return replace(one, reason="known again by its stems, but no other place confirms it")
+
+    def _agree(self, one: Verdict, other: Verdict) -> bool:
+        frames, ends = self._solved.frames, (list(one.keys), list(other.keys))
+        if one.keys[1] == other.keys[1] or (frames.session[ends[0]] != frames.session[ends[1]]).any():
+            return False
+        way_m = float(np.abs(frames.travelled_m[ends[0]] - frames.travelled_m[ends[1]]).sum())
+        return agree(self._claimed(one), self._claimed(other), frames.positions_m[one.keys[1]], way_m)
+
+    def _claimed(self, one: Verdict) -> Array:
+        """(4, 4) `odom` of b in `odom` of a."""
+        frames, poses = self._solved.frames, np.tile(np.eye(4), (2, 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = frames.rotations[list(one.keys)], frames.positions_m[list(one.keys)]
+        assert one.closure is not None
+        return np.asarray(poses[0] @ one.closure.pose @ np.linalg.inv(poses[1]))
+
+    def _guessed(self, guess: Guess, recognised: Recognised | None = None) -> Candidate:
         if self._submap_at(guess.a, guess.a_s) > self._submap_at(guess.b, guess.b_s):
             guess = turned_round(guess)
         a, b = self._submap_at(guess.a, guess.a_s), self._submap_at(guess.b, guess.b_s)
         from_a, from_b = self._seen_from(a, guess.a, guess.a_s), self._seen_from(b, guess.b, guess.b_s)
-        return Candidate(a, b, 0.0, 1.0, from_a @ pose_of(guess) @ np.linalg.inv(from_b))
+        apart_m = float(np.linalg.norm(self._pose(self._keys[a])[:2, 3] - self._pose(self._keys[b])[:2, 3]))
+        return Candidate(a, b, apart_m, 1.0, from_a @ pose_of(guess) @ np.linalg.inv(from_b), recognised)
 
     def _submap_at(self, name: str, second: float) -> int:
         number, frames = number_of(name, self._names), self._solved.frames

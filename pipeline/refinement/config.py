@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 import msgspec
@@ -72,9 +73,50 @@ class ClosureConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A registration less certain than that along any direction is degenerate."""
 
 
+class RecognitionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Places known again by their stems, where the trajectory does not bring them near each other by itself."""
+
+    enabled: bool = True
+    met_m: Positive = 0.4
+    """A stem that has another one so close is met."""
+    least_stems: Annotated[int, msgspec.Meta(ge=4)] = 8
+    least_nats: Positive = 12.0
+    """Of the stems met, against as many met by chance: of all poses of all places, one is good by chance."""
+    rival_m: Positive = 1.0
+    rival_deg: Positive = 8.0
+    """A pose farther than that from the best one is another answer."""
+    rival_share: Positive = 0.75
+    """Of the share of stems that the best one meets: another answer that meets as much makes the place ambiguous."""
+    each: Annotated[int, msgspec.Meta(ge=1)] = 2
+    """Proposals a submap, the best ones."""
+
+    @property
+    def rival_rad(self) -> float:
+        """As radians."""
+        return math.radians(self.rival_deg)
+
+
+class MovingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What moved, taken out of the map."""
+
+    enabled: bool = True
+    stays_s: Positive = 2.0
+    """In a cell of 0.1 m, at most."""
+    apart_s: Positive = 0.5
+    """Rays so long before or after tell what was there at another time."""
+    rays: Annotated[int, msgspec.Meta(ge=1)] = 6
+    moments: Annotated[int, msgspec.Meta(ge=1)] = 3
+    """So many of them, at so many different times, must have passed a cell; and no more than hit it in between."""
+    least_cells: Annotated[int, msgspec.Meta(ge=1)] = 20
+    least_height_m: Positive = 0.5
+    """Such cells that touch make something that moved if there are as many, and it is so high."""
+
+
 class RefinementConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """All of it."""
 
     chain: ChainConfig = ChainConfig()
     gnss: GnssConfig = GnssConfig()
     closures: ClosureConfig = ClosureConfig()
+    recognition: RecognitionConfig = RecognitionConfig()
+    moving: MovingConfig = MovingConfig()

@@ -41,7 +41,10 @@ def write_page(path: Path, found: Refined) -> None:
 
 
 _WAY = "Lines across join places that were recognised; in the third colour those that were not believed."
-_CLOSURES = "Every pair of places that the trajectory brings near each other; times are seconds since the first pose."
+_CLOSURES = (
+    "Every pair of places that the trajectory brings near each other, or that were known again by their stems; times "
+    "are seconds since the first pose."
+)
 _LINES = "Copy those that you know better into constraints.toml beside this page, and refine again."
 _PINS = (
     "A surveyed point: [[pin]] with at_s, latitude_deg, longitude_deg, height_m (above the ellipsoid), sigma_m, and "
@@ -120,10 +123,11 @@ def rejected_stretches(found: Refined) -> list[tuple[int, float, float, int]]:
 def _lines(found: Refined) -> Iterator[str]:
     names = found.problem.names
     for one, row in zip(found.verdicts, rows(found), strict=True):
-        word, why = ("forbid", f"overlap {row[8]}") if one.sound else ("accept", row[5])
+        cell = dict(zip(HEADER, row, strict=True))
+        word, why = ("forbid", f"overlap {cell['overlap']}") if one.sound else ("accept", cell["reason"])
         if one.registered is not None:
-            ends = f"a = {_quoted(row[0])}\nb = {_quoted(row[2])}\n" if len(names) > 1 else ""
-            yield f"[[{word}]]  # {why}\n{ends}a_s = {row[1]}\nb_s = {row[3]}\n"
+            ends = f"a = {_quoted(cell['a'])}\nb = {_quoted(cell['b'])}\n" if len(names) > 1 else ""
+            yield f"[[{word}]]  # {why}\n{ends}a_s = {cell['a_s']}\nb_s = {cell['b_s']}\n"
     for number, from_s, to_s, count in rejected_stretches(found)[:_OFFERED]:
         last_s = found.problem.sessions[number].duration_s - _ROUNDING_S
         begin, end = max(from_s - _AROUND_S, 0.0), min(to_s + _AROUND_S, last_s)

@@ -7,14 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.refinement.closing import Closing, Verdict
+from pipeline.refinement.closing import Closing, Place, Verdict
 from pipeline.refinement.constraints import check
+from pipeline.refinement.proposals import proposals
+from pipeline.refinement.registration import Registered
 from pipeline.refinement.session import Problem, Session
 from pipeline.refinement.solver import Solution, Solver
 from pipeline.refinement.starts import groups
 
+_RECOGNISING = 0.1
+"""Of the work, if any."""
 _SOLVING = 0.2
-"""Of the work; the rest is registration."""
+"""Of the rest; what then remains is registration."""
 DOUBTED = "does not agree with GNSS, odometry and the other closures"
 _CONTRADICTED = 5.0
 """Sigmas of a pin."""
@@ -49,11 +53,16 @@ def refine(problem: Problem, advance: Callable[[float], None] = lambda _: None) 
     """Sessions together, as far as they belong together; the others each alone, which their notes say. The largest
     group comes first. RefinementError for what cannot be refined, or constraints that cannot be met."""
     check(problem.constraints, {session.name: session.duration_s for session in problem.sessions})
+    placed = problem.placed()
+    if problem.config.closures.enabled:
+        known = proposals(problem.sessions, placed, problem.config, _Share(advance, 0.0, _RECOGNISING))
+        problem = replace(problem, recognised=tuple(known))
     if len(problem.sessions) == 1:
-        return [_with_doubts(_together(problem, advance))]
-    parts, done = groups(problem, problem.placed()), list[Refined]()
+        return [_with_doubts(_together(problem, _Share(advance, _RECOGNISING, 1.0 - _RECOGNISING)))]
+    parts, done = groups(problem, placed), list[Refined]()
     for k, numbers in enumerate(parts):
-        told = _Share(advance, k / len(parts), 1 / len(parts))
+        share = (1.0 - _RECOGNISING) / len(parts)
+        told = _Share(advance, _RECOGNISING + min(k * share, 1.0 - _RECOGNISING - share), share)
         found = _together(problem.of(numbers), told)
         if loose := [numbers[k] for k in found.loose]:
             tied = [number for number in numbers if number not in loose]
@@ -71,10 +80,10 @@ def _together(problem: Problem, advance: Callable[[float], None]) -> Refined:
         return Refined(problem, first, first)
     if not any(session.submaps for session in problem.sessions):
         return Refined(problem, first, first, notes=("there are no submaps: no loops were looked for",))
-    verdicts: list[Verdict] = []
+    verdicts, known = list[Verdict](), dict[Place, Registered]()
     for k in range(ROUNDS):
         told = _Share(advance, _SOLVING + k * (1.0 - _SOLVING) / ROUNDS, (1.0 - _SOLVING) / ROUNDS)
-        verdicts = Closing(problem, solved).verdicts(told)
+        verdicts = Closing(problem, solved, known).verdicts(told)
         solved = solver.solve([one.closure for one in verdicts if one.closure is not None and one.sound])
         if not solved.closures:
             break

@@ -16,6 +16,7 @@ from pipeline.refinement.config import ChainConfig, RefinementConfig
 from pipeline.refinement.constraints import Constraints, Stretch, number_of
 from pipeline.refinement.fixes import Fixes, place_fixes
 from pipeline.refinement.keyframes import Keyframes, Poses, keyframes
+from pipeline.refinement.recognition import Proposal
 from pipeline.refinement.submaps import Submap
 
 
@@ -49,6 +50,8 @@ class Problem:
     sessions: tuple[Session, ...]
     config: RefinementConfig
     constraints: Constraints = field(default_factory=Constraints)
+    recognised: tuple[Proposal, ...] = ()
+    """Places known again, of these sessions."""
 
     @property
     def names(self) -> list[str]:
@@ -66,7 +69,9 @@ class Problem:
     def of(self, numbers: Sequence[int]) -> Problem:
         """Some of the sessions, and what is said of them alone."""
         sessions = tuple(self.sessions[k] for k in numbers)
-        return Problem(sessions, self.config, self.constraints.about({one.name for one in sessions}))
+        names = {one.name for one in sessions}
+        known = tuple(one for one in self.recognised if {one.guess.a, one.guess.b} <= names)
+        return Problem(sessions, self.config, self.constraints.about(names), known)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

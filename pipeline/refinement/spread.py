@@ -4,45 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from pipeline.estimates import Array
 from pipeline.products.track import Placement
 from pipeline.refinement.solver import Solution
 
 
-def placement(track: npt.NDArray[np.void], solved: Solution) -> Placement | None:
-    """`odom` in `map` at each estimate (n,) of the track; None where fixes do not tell. solved: of that session alone.
+def placement(track: npt.NDArray[np.void], solved: Solution) -> Placement:
+    """`odom` at each estimate (n,) of the track in `map`, or in `local` where fixes do not tell. solved: of that
+    session alone.
 
-    By yaw and translation: gravity levels `odom`, so that no more is left of roll and pitch than `chain.level_deg`.
+    The tilt that the graph found is in it: 0.3 degrees are 15 cm at 30 m.
     """
-    if solved.datum is None:
-        return None
-    translation, yaw, covariance = corrections(track, solved)
-    datum = (solved.datum.latitude_deg, solved.datum.longitude_deg, solved.datum.height_m)
-    return Placement(datum, translation, yaw, covariance)
-
-
-def corrections(track: npt.NDArray[np.void], solved: Solution) -> tuple[Array, Array, Array]:
-    """Translation (n, 3), yaw (n,), and covariance (n, 6, 6) of `base_link`, at each estimate."""
     frames, poses = solved.frames, solved.poses
     before, share = _between(track, solved)
     turns = poses.rotations @ frames.rotations.transpose(0, 2, 1)
-    yaw = np.unwrap(np.arctan2(turns[:, 1, 0] - turns[:, 0, 1], turns[:, 0, 0] + turns[:, 1, 1]))
-    yaw_rad = (1.0 - share) * yaw[before] + share * yaw[before + 1]
-    one = share[:, None]
-    odom_m = track["position_m"]
+    turned = _faded(turns, before, share)
+    one, odom_m = share[:, None], track["position_m"]
     placed = (1.0 - one) * _carried(odom_m, before, turns, solved) + one * _carried(odom_m, before + 1, turns, solved)
-    cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
-    x, y, z = odom_m.T
-    translation = placed - np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z])
     many = share[:, None, None]
     covariance = (1.0 - many) * solved.covariance[before] + many * solved.covariance[before + 1]
-    return translation, yaw_rad, covariance
+    datum = solved.datum
+    return Placement(
+        None if datum is None else (datum.latitude_deg, datum.longitude_deg, datum.height_m),
+        placed - np.einsum("nij,nj->ni", turned, odom_m),
+        turned,
+        covariance,
+    )
 
 
-def corrected(track: npt.NDArray[np.void], solved: Solution) -> tuple[Array, Array]:
-    """Positions (n, 3) and rotations (n, 3, 3) of the whole track, in the frame of the solution."""
-    return Placement((0.0, 0.0, 0.0), *corrections(track, solved)).poses(track)
+def _faded(turns: Array, before: npt.NDArray[np.int64], share: Array) -> Array:
+    """(n, 3, 3) along the shortest way from the correction (m, 3, 3) of one keyframe to that of the next."""
+    steps = Rotation.from_matrix(turns[:-1].transpose(0, 2, 1) @ turns[1:]).as_rotvec()
+    return np.asarray(turns[before] @ Rotation.from_rotvec(share[:, None] * steps[before]).as_matrix())
 
 
 def _between(track: npt.NDArray[np.void], solved: Solution) -> tuple[npt.NDArray[np.int64], Array]:

@@ -20,7 +20,8 @@ from pipeline.refinement.session import Placed, Problem, about_vertical
 def starts(problem: Problem, placed: Sequence[Placed]) -> Poses:
     """All keyframes in one frame: `map` of the first session with fixes, or `odom` of the first.
 
-    A session without fixes lies where a `[[closure]]` has it, or else where its `odom` begins.
+    A session without fixes lies where a `[[closure]]` has it, or stems that were known again, or else where its `odom`
+    begins.
     """
     datum = next((one.fixes.datum for one in placed if one.fixes is not None), None)
     found = {k: _moved(one, datum) for k, one in enumerate(placed) if one.fixes is not None and datum is not None}
@@ -36,7 +37,7 @@ def starts(problem: Problem, placed: Sequence[Placed]) -> Poses:
 
 
 def groups(problem: Problem, placed: Sequence[Placed]) -> list[list[int]]:
-    """Sessions that come near each other by their fixes, or are joined by a `[[closure]]`; the largest group first."""
+    """Sessions that come near each other by their fixes, or that a `[[closure]]` or stems join; the largest first."""
     pairs = {(a, b) for a, b, _ in _guesses(problem)}
     on_earth = {k: one for k, one in enumerate(placed) if one.fixes is not None}
     for b, later in on_earth.items():
@@ -77,7 +78,9 @@ def levelled(rotation: Array, position_m: Array) -> Array:
 
 
 def _guesses(problem: Problem) -> Iterator[tuple[int, int, Guess]]:
-    for guess in problem.constraints.closure:
+    """Between sessions: the analyst's, then those by stems that the most others confirm."""
+    known = sorted(problem.recognised, key=lambda one: -one.confirmed)
+    for guess in (*problem.constraints.closure, *(one.guess for one in known if one.confirmed)):
         a, b = number_of(guess.a, problem.names), number_of(guess.b, problem.names)
         if a != b:
             yield a, b, guess

@@ -9,7 +9,10 @@ from pathlib import Path
 
 from pipeline.refinement.refine import Refined
 
-HEADER = ("a", "a_s", "b", "b_s", "believed", "reason", "apart_m", "sigma_m", "overlap", "rival_m", "correction_m")
+HEADER = ("a", "a_s", "b", "b_s", "from", "believed", "reason", "apart_m", "sigma_m", "overlap", "rival_m",
+          "correction_m", "stems")  # fmt: skip
+"""from: `way` (the trajectory brings them near each other), `stems` (known again by these), `analyst`. stems: met, of
+those that should be."""
 
 
 def write_closures(path: Path, found: Refined) -> None:
@@ -30,4 +33,6 @@ def rows(found: Refined) -> Iterator[tuple[str, ...]]:
         numbers = [one.candidate.apart_m, one.candidate.sigma_m]
         numbers += [measured.overlap, measured.rival_m, one.correction_m] if measured is not None else [math.nan] * 3
         cells = [f"{number:.3f}" if math.isfinite(number) else "" for number in numbers]
-        yield (*ends, "yes" if one.sound else "no", one.reason, *cells)
+        known = one.candidate.recognised
+        stems = f"{known.met} of {known.asked}" if known is not None else ""
+        yield (*ends, one.candidate.origin, "yes" if one.sound else "no", one.reason, *cells, stems)

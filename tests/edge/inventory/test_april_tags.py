@@ -18,7 +18,7 @@ def test_a_tag_in_the_video_is_a_ray_from_where_the_camera_was_on_the_map_when_i
     track["position_m"][:, 0] = np.arange(20) * 0.1
     track["rotation"] = np.eye(3)
     yaw, shift = 0.5, np.array([7.0, -3.0, 50.0])
-    placement = Placement((40.0, -75.0, 0.0), np.tile(shift, (20, 1)), np.full(20, yaw), np.zeros((20, 6, 6)))
+    placement = Placement.upright((40.0, -75.0, 0.0), np.tile(shift, (20, 1)), np.full(20, yaw), np.zeros((20, 6, 6)))
     lens = CameraModel(640, 480, (500.0, 500.0), (319.5, 239.5))
     way = CameraWay(track, placement, CameraRig(lens, FORWARD, np.array([0.0, 0.0, 0.2]), late_s=LATE_S))
     image = np.full((480, 640), 255, np.uint8)

@@ -83,7 +83,7 @@ def test_a_placed_session_has_its_trees_and_its_searched_area_in_the_map(work):
     poses = len(np.fromfile(work / "odometry" / odometry_stage.TRACK, ESTIMATE))
     shift = np.array([100.0, -50.0, 7.0])
     covariance = np.tile(0.25 * np.eye(6), (poses, 1, 1))
-    placement = Placement((47.0, 8.0, 500.0), np.tile(shift, (poses, 1)), np.full(poses, np.pi / 2), covariance)
+    placement = Placement.upright((47.0, 8.0, 500.0), np.tile(shift, (poses, 1)), np.full(poses, np.pi / 2), covariance)
     local, _ = run(work)
     write_placement(work / "fusion" / fusion_stage.PLACEMENT, placement)
     trees, findings = run(work)

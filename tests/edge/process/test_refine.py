@@ -36,16 +36,17 @@ def test_without_a_heading_the_refined_way_is_local_and_says_so_and_a_second_run
     task, config = Task([recording]), Config()
     done = refine(task, config, load=fakes(odometry=Striding))
     assert done.folder == recording.parent / "walk_products" / "refined"
-    assert done.redone == ("odometry", "fusion", "products", "refined/refinement", "refined/products")
-    assert done.facts.frame == "odom"
+    assert done.redone == ("odometry", "fusion", "products", "refined/refinement", "refined/moving", "refined/products")
+    assert (done.facts.frame, done.facts.crs, done.facts.datum) == ("local", "local", None)
+    assert any("no coordinate system is named" in note for note in done.facts.notes)
     made = {path.name for path in done.folder.iterdir()}
-    assert made >= {"refinement.json", "refinement.html", "closures.csv", "trajectory_refined.tum", "map_local.laz"}
+    assert made >= {"refinement.json", "refinement.html", "closures.csv", "trajectory_local.tum", "map_local.laz"}
     told = json.loads((done.folder / "refinement.json").read_text())
     assert (told["recording"][0][0], told["config"]["gnss"]["kernel"]) == ("walk.mcap", "huber")
     assert refine(task, config, load=None).redone == ()
     closures = msgspec.structs.replace(config.refinement.closures, enabled=False)
     changed = msgspec.structs.replace(config, refinement=msgspec.structs.replace(config.refinement, closures=closures))
-    assert refine(task, changed, load=None).redone == ("refined/refinement", "refined/products")
+    assert refine(task, changed, load=None).redone == ("refined/refinement", "refined/moving", "refined/products")
 
 
 def test_constraints_that_cannot_be_met_are_named(recording):

@@ -31,7 +31,7 @@ def test_sessions_that_nothing_joins_are_refined_alone_and_a_second_run_does_not
     assert [group.sessions for group in done.groups] == [("walk",), ("later",)]
     for name in ("walk", "later"):
         made = {path.name for path in (done.folder / name).iterdir()}
-        assert made >= {"refinement.html", "closures.csv", "trajectory_refined.tum", "map_local.laz", "products.json"}
+        assert made >= {"refinement.html", "closures.csv", "trajectory_local.tum", "map_local.laz", "products.json"}
         told = json.loads((done.folder / name / "refinement.json").read_text())
         assert f"{name} was refined alone" in told["notes"][0]
     assert refine_together(two, Config(), load=None).redone == ()

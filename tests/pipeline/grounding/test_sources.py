@@ -36,7 +36,7 @@ def test_only_the_last_sweeps_are_held():
 def test_a_tree_goes_to_the_map_with_the_placement_of_its_time():
     stamps = np.array([0, 100, 200])
     cov = np.tile(np.diag([0.04, 0.09, 0.16, 0, 0, 0]), (3, 1, 1))
-    placement = Placement(
+    placement = Placement.upright(
         (40.0, -75.0, 0.0), np.array([[0, 0, 0], [10.0, 0, 1], [99, 99, 99]]), np.array([0, np.pi / 2, 1]), cov
     )
     one = tree(1, 2.0, 1.0)

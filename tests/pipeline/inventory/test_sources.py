@@ -96,7 +96,7 @@ def test_a_sessions_map_knows_where_the_scanner_stood(tmp_path):
         store.add(np.column_stack([xyz, np.full(300, 200.0 if sweep else 20.0)]).astype(np.float32), sweep)
     store.close()
     shift, quarter = np.tile([2.0, 0.0, 0.0], (2, 1)), np.full(2, np.pi / 2)
-    placement = Placement((40.0, -75.0, 50.0), shift, quarter, np.zeros((2, 6, 6)))
+    placement = Placement.upright((40.0, -75.0, 50.0), shift, quarter, np.zeros((2, 6, 6)))
     source = TileMap(tmp_path / "tiles", 0.02, positions, placement)
     assert source.count == 600
     assert source.crs.to_epsg() == 32618

@@ -135,7 +135,7 @@ def source(folder: Path, placement: Placement | None) -> MapSource:
 
 def test_the_map_is_laz_with_crs_time_intensity_and_sigma(tmp_path):
     yaw = 0.3
-    placement = Placement(DATUM, np.array([[5.0, 6.0, 7.0]] * 3), np.full(3, yaw), np.zeros((3, 6, 6)))
+    placement = Placement.upright(DATUM, np.array([[5.0, 6.0, 7.0]] * 3), np.full(3, yaw), np.zeros((3, 6, 6)))
     count = write_laz(tmp_path / "map.laz", [source(tmp_path / "tiles", placement)], lambda _: None)
     read = laspy.read(tmp_path / "map.laz")
     assert (str(read.header.version), read.header.point_format.id, len(read.points)) == ("1.4", 6, count)
@@ -185,7 +185,7 @@ def test_what_the_camera_made_of_each_point_is_in_the_map(tmp_path):
 
 
 def test_points_of_several_sessions_tell_which_they_are_of(tmp_path):
-    placement = Placement(DATUM, np.zeros((3, 3)), np.zeros(3), np.zeros((3, 6, 6)))
+    placement = Placement.upright(DATUM, np.zeros((3, 3)), np.zeros(3), np.zeros((3, 6, 6)))
     first = source(tmp_path / "tiles", placement)
     count = write_laz(tmp_path / "map.laz", [replace(first, number=1), replace(first, number=2)], lambda _: None)
     read = laspy.read(tmp_path / "map.laz")
@@ -199,6 +199,12 @@ def test_a_local_map_has_no_crs_and_says_why(tmp_path):
     assert read.header.parse_crs() is None
     text = next(vlr for vlr in read.header.vlrs if vlr.record_id == 3)
     assert b"coordinates are local" in text.record_data
+    plain, shift = np.array(read.xyz), np.array([[5.0, 6.0, 7.0]] * 3)
+    refined = Placement.upright(None, shift, np.full(3, np.pi / 2), np.zeros((3, 6, 6)))
+    write_laz(tmp_path / "refined.laz", [source(tmp_path / "again", refined)], lambda _: None)
+    read = laspy.read(tmp_path / "refined.laz")
+    assert read.header.parse_crs() is None
+    np.testing.assert_allclose(read.xyz, plain @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]] + shift[0], atol=0.0011)
 
 
 def test_plots_keep_peaks_and_label_round_values():

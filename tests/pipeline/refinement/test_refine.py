@@ -11,7 +11,7 @@ pytest.importorskip("small_gicp", reason="small_gicp is not installed")
 from pipeline.gnss.config import FusionConfig
 from pipeline.gnss.geodesy import Datum
 from pipeline.products.track import estimate_of
-from pipeline.refinement.config import ChainConfig, RefinementConfig
+from pipeline.refinement.config import ChainConfig, ClosureConfig, RecognitionConfig, RefinementConfig
 from pipeline.refinement.constraints import Constraints, Guess, Pin
 from pipeline.refinement.errors import ConstraintsRefused, NothingToRefine
 from pipeline.refinement.refine import refine
@@ -63,7 +63,8 @@ def test_sessions_that_do_not_meet_are_refined_alone_and_told_why():
     assert "blind was refined alone: GNSS does not place it" in found[2].notes[0]
 
 
-def test_a_session_without_fixes_is_joined_by_a_closure_that_names_it(tmp_path):
+@pytest.mark.parametrize("joined_by", ["stems", "closure"])
+def test_a_session_without_fixes_is_joined_by_its_stems_or_by_a_closure_that_names_it(tmp_path, joined_by):
     """The second carrier walks a part of the same way, another day; the guess is half a metre off."""
     way = walks.circle(radius_m=12.0)
     later = tuple(part[40:66] for part in way)
@@ -73,9 +74,14 @@ def test_a_session_without_fixes_is_joined_by_a_closure_that_names_it(tmp_path):
         write_submaps(tmp_path / name, one.track, walked, seed=len(given))
         given.append(Session(one.track, one.fixes, WHITE, read_submaps(tmp_path / name), name))
     guess = Guess(25.0, 5.0, x_m=0.4, y_m=-0.3, a="a", b="b")
-    (found,) = refine(Problem(tuple(given), CONFIG, Constraints(closure=(guess,))))
+    asked = Constraints(closure=(guess,) if joined_by == "closure" else ())
+    known = RecognitionConfig(enabled=joined_by == "stems")
+    config = RefinementConfig(CONFIG.chain, closures=ClosureConfig(each=1), recognition=known)
+    (found,) = refine(Problem(tuple(given), config, asked))
     assert found.problem.names == ["a", "b"]
     assert found.solution.closures
+    origins = {one.candidate.origin for one in found.verdicts if one.sound}
+    assert joined_by in origins if joined_by == "stems" else "stems" not in origins
     assert np.linalg.norm(errors_m(found, 1, later), axis=1).mean() < 0.3
 
 
