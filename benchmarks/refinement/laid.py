@@ -21,8 +21,8 @@ from pipeline.evaluation.map import Asked, MapQuality, map_quality
 from pipeline.evaluation.trajectory import Trajectory
 from pipeline.inventory.source import open_map
 
-STRIDE = 12
-"""One point of so many: a million of a walk of 400 m by bicycle."""
+STRIDE = 24
+"""One point of so many: half a million of a walk of 400 m by bicycle."""
 RESOLUTION_M = 0.0005
 
 
