@@ -3,7 +3,7 @@
     python -m benchmarks.refinement.peers --cache DIR --peers-python PY [--results FILE] [--scenarios bicycle]
         [--seeds 1 2 3] [--systems ours refined rko_lio kiss_slam] [--length M]
 
-Without GNSS, which the peers do not take. They run in an environment of their own: `pip install kiss-slam rko_lio`.
+Without GNSS, which the peers do not take. These run in an environment of their own: `pip install kiss-slam rko_lio`.
 APE after SE(3) alignment. A map is the same points for all, laid with each one's poses (`laid.py`); `truth` is what the
 true poses make of them. Its figures are those of `evaluate map`. Milliseconds are mean processor time a scan; what is
 done in the end is shared out among the scans. Poses that are there, and what stands in the file of results, are not
