@@ -75,7 +75,7 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Per pose: size (m) with GNSS, and without over the same poses; nees: mean over three degrees of freedom."""
+    """Per pose: size (m) with GNSS, and without over the same poses. nees: for each degree of freedom; 1 is honest."""
 
     size_m: Array
     without_m: Array
@@ -183,7 +183,7 @@ def _errors(walk: Walk, poses: list[tuple[int, GlobalPose, Datum]]) -> Errors:
         error = walk.datum.enu(*datum.geodetic(pose.position_enu_m)) - walk.odometry.truth_m[k]
         errors.append(float(np.linalg.norm(error)))
         nees.append(float(error @ np.linalg.solve(pose.covariance[:3, :3], error)))
-    return Errors(np.array(errors), walk.odometry.alone_m[[k for k, _, _ in poses]], float(np.mean(nees)))
+    return Errors(np.array(errors), walk.odometry.alone_m[[k for k, _, _ in poses]], float(np.mean(nees)) / 3.0)
 
 
 def datum_of(world: World) -> Datum:

@@ -28,7 +28,7 @@ def tracked(world: World, cache: Path) -> Odometry:
     stamps = found["stamp_ns"] - EPOCH_NS
     inside = stamps <= world.trajectory.duration_ns
     stamps = stamps[inside]
-    position, rotation = found["position"][inside], found["rotation"][inside]
+    position, rotation, velocity = (found[name][inside] for name in ("position", "rotation", "velocity"))
     covariance = found["covariance"][inside][:, POSITION_FIRST][:, :, POSITION_FIRST]
     weak = np.isin(
         found["status"][inside], [one.value for one in (Status.DEGENERATE, Status.DOUBTFUL, Status.COASTING)]
@@ -39,7 +39,7 @@ def tracked(world: World, cache: Path) -> Odometry:
             stamp_ns=int(stamp),
             position_m=position[k],
             rotation=rotation[k],
-            velocity_m_s=found["velocity"][k],
+            velocity_m_s=velocity[k],
             covariance=covariance[k],
             gyro_bias=np.zeros(3),
             accel_bias=np.zeros(3),

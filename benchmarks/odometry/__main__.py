@@ -10,20 +10,17 @@ Times are of the processor, not of the clock on the wall: other work on the mach
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.odometry.simulated import EPOCH_NS, IMU_NS, LIDAR_IN_BASE_M, Walk, shortened, walk
+from benchmarks.odometry.simulated import Walk, shortened, walk
+from benchmarks.odometry.systems import run, stamps_ns
 from drivers.sim.scenarios import scenario
 from pipeline.evaluation.trajectory import Trajectory, TrajectoryErrors, aligned, trajectory_errors
 
-PEERS_START_S = 100.0
 SCENARIOS = ("open_trail", "thicket", "slope", "meadow_edge", "bicycle", "uav", "shaking", "loop_1200")
 SYSTEMS = ("ours", "rko_lio", "rko_lio_fine", "genz_lio", "kiss_icp")
 DIVERGED_M = 5.0
@@ -58,15 +55,15 @@ def score(one: Walk, system: str, options: argparse.Namespace) -> Score:
     """Run, or take from the cache when asked to, and compare with the truth after SE(3) alignment."""
     target = one.folder / f"{system}_{options.threads}.npz"
     if not (options.reuse and target.exists()):
-        _run(one, system, target, options)
+        python = options.genz_python if system.startswith("genz") else options.peers_python
+        run(one, system, target, python, options.threads)
     found = np.load(target)
-    stamps = found["stamp_ns"] if system == "ours" else _host_ns(found["stamps_s"])
+    stamps = stamps_ns(found)
     t, position, quaternion, _ = one.truth()
     inside = (stamps >= t[0]) & (stamps <= t[-1])
     if inside.sum() < 10:
         return Score(system, False, None, None, 0.0, 0.0, 0.0, str(found["failed"]) or "no poses")
     truth = _truth_at(t, position, quaternion, stamps[inside])
-    # Rotations of peers are not kept: positions alone say where they were.
     laid = aligned(Trajectory(truth.stamps_ns, found["position"][inside], truth.rotations), truth, "se3")
     laid = Trajectory(truth.stamps_ns, laid.positions_m, truth.rotations)
     over_10 = trajectory_errors(laid, truth, rpe_over_m=10.0)
@@ -81,48 +78,6 @@ def score(one: Walk, system: str, options: argparse.Namespace) -> Score:
         float(found["peak_mb"]),
         str(found["failed"]),
     )
-
-
-def _run(one: Walk, system: str, target: Path, options: argparse.Namespace) -> None:
-    threads = str(options.threads)
-    environment = os.environ | {"NUMBA_NUM_THREADS": threads, "OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": "1"}
-    if system == "ours":
-        command = [sys.executable, "-m", "benchmarks.odometry.run_ours", str(one.folder), str(target)]
-    else:
-        python = options.genz_python if system.startswith("genz") else options.peers_python
-        script = Path(__file__).with_name("run_peer.py")
-        command = [python, str(script), system, str(_exported(one)), str(target), threads]
-    ended = subprocess.run(command, env=environment, check=False, capture_output=True, text=True)
-    if ended.returncode != 0:
-        last = (ended.stderr.strip().splitlines() or [""])[-1]
-        nothing = np.empty(0)
-        empty = {"stamp_ns": nothing, "stamps_s": nothing, "position": np.empty((0, 3)), "ms": nothing, "peak_mb": 0.0}
-        np.savez(target, failed=f"exit {ended.returncode}: {last}", **empty)
-
-
-def _exported(one: Walk) -> Path:
-    path = one.folder / "peer_input.npz"
-    if not path.exists():
-        scans = list(one.scans())
-        imu = np.load(one.folder / "imu.npy")
-        np.savez(
-            path,
-            xyz=np.concatenate([scan.xyz_m for scan in scans]),
-            offset_s=np.concatenate([scan.offset_ns * 1e-9 for scan in scans]).astype(np.float32),
-            ends=np.cumsum([len(scan.xyz_m) for scan in scans]),
-            scan_s=[_peer_s(scan.stamp_ns) for scan in scans],
-            imu=np.column_stack([PEERS_START_S + np.arange(len(imu)) * IMU_NS * 1e-9, imu[:, :6]]),
-            lever=np.array(LIDAR_IN_BASE_M),
-        )
-    return path
-
-
-def _peer_s(stamp_ns: int) -> float:
-    return (stamp_ns - EPOCH_NS) * 1e-9 + PEERS_START_S
-
-
-def _host_ns(stamps_s: np.ndarray) -> np.ndarray:
-    return np.round((stamps_s - PEERS_START_S) * 1e9).astype(np.int64) + EPOCH_NS
 
 
 def _truth_at(t: np.ndarray, position: np.ndarray, quaternion: np.ndarray, stamps: np.ndarray) -> Trajectory:

@@ -3,7 +3,8 @@
     python run_peer.py PEER INPUT.npz OUTPUT.npz THREADS
 
 INPUT: xyz (n, 3) float32, offset_s (n,) float32, ends (scans,), scan_s (scans,) start of each sweep, imu (m, 7) time,
-rate, force; lever (3,). OUTPUT: stamps_s (k,), position (k, 3), ms (k,), peak_mb, failed (a text, empty when it ended).
+rate, force; lever (3,). OUTPUT: stamps_s (k,), position (k, 3) and rotation (k, 3, 3) of `base_link`, ms (k,), peak_mb,
+failed (a text, empty when it ended).
 """
 
 from __future__ import annotations
@@ -23,17 +24,18 @@ def main() -> None:
     threads = int(sys.argv[4])
     data = dict(np.load(source))
     failed = ""
-    rows: list[tuple[float, float, float, float, float]] = []
+    rows: list[tuple[float, np.ndarray, float]] = []
     try:
         for row in PEERS[peer](data, threads):
             rows.append(row)
     except Exception as error:
         failed = f"{type(error).__name__}: {error}"
-    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
+    poses = np.array([pose for _, pose, _ in rows]).reshape(-1, 4, 4)
     # Not `getrusage`: that remembers the parent's size from before the exec.
     peak_mb = int(Path("/proc/self/status").read_text(encoding="ascii").split("VmHWM:")[1].split()[0]) / 1024.0
     peak_mb -= sum(array.nbytes for array in data.values()) / 2**20  # its input, which a payload would not hold
-    np.savez(target, stamps_s=table[:, 0], position=table[:, 1:4], ms=table[:, 4], peak_mb=peak_mb, failed=failed)
+    numbers = {"stamps_s": [row[0] for row in rows], "ms": [row[2] for row in rows], "peak_mb": peak_mb}
+    np.savez(target, position=poses[:, :3, 3], rotation=poses[:, :3, :3], failed=failed, **numbers)
 
 
 def _sweeps(data):
@@ -61,7 +63,7 @@ def _rko(data, **settings):
         took = 1e3 * (time.process_time() - begun)
         times, poses = lio.poses_with_timestamps()
         if len(times):
-            yield (float(times[-1]) * 1e-9, *np.asarray(poses[-1])[:3], took)
+            yield float(times[-1]) * 1e-9, _pose(*np.split(np.asarray(poses[-1]), [3])), took
 
 
 def rko(data, threads):
@@ -90,8 +92,7 @@ def genz(data, threads):
         begun = time.process_time()
         result = lio.register_scan(xyz, start, end, rows, timestamps=offset.astype(np.float64))
         took = 1e3 * (time.process_time() - begun)
-        pose = np.asarray(result.pose)
-        yield (end, *pose[:3, 3], took)
+        yield end, np.asarray(result.pose), took
 
 
 def kiss(data, threads):
@@ -106,12 +107,48 @@ def kiss(data, threads):
         begun = time.process_time()
         odometry.register_frame(xyz, offset / SWEEP_S)
         took = 1e3 * (time.process_time() - begun)
-        # The sensor's own pose, at mid-sweep; the lever is put back so that base_link is compared.
-        pose = odometry.last_pose
-        yield (start + 0.5 * SWEEP_S, *(pose[:3, 3] - pose[:3, :3] @ data["lever"]), took)
+        yield start + 0.5 * SWEEP_S, _of_base(odometry.last_pose, data["lever"]), took
 
 
-PEERS = {"rko_lio": rko, "rko_lio_fine": rko_fine, "genz_lio": genz, "kiss_icp": kiss}
+def kiss_slam(data, threads):
+    from kiss_slam.config import load_config
+    from kiss_slam.slam import KissSLAM
+
+    config = load_config(None)
+    config.odometry.registration.max_num_threads = threads
+    config.local_mapper.splitting_distance = 30.0  # as the crow flies; by default 100 m, and short walks have no loops
+    slam, rows = KissSLAM(config), []
+    for start, xyz, offset in _sweeps(data):
+        begun = time.process_time()
+        slam.process_scan(xyz, offset / SWEEP_S)
+        rows.append((start + 0.5 * SWEEP_S, 1e3 * (time.process_time() - begun)))
+    begun = time.process_time()
+    slam.generate_new_node()
+    slam.local_map_graph.erase_last_local_map()
+    poses, _ = slam.fine_grained_optimization()
+    at_the_end = 1e3 * (time.process_time() - begun) / len(rows)
+    print(f"{len(slam.get_closures())} closures", flush=True)
+    for (stamp, took), pose in zip(rows, poses, strict=True):
+        yield stamp, _of_base(pose, data["lever"]), took + at_the_end
+
+
+def _of_base(pose, lever):
+    """From the pose of the sensor, which is at mid-sweep; both have the same axes."""
+    moved = np.array(pose)
+    moved[:3, 3] -= moved[:3, :3] @ lever
+    return moved
+
+
+def _pose(place, quaternion):
+    """quaternion: x y z w."""
+    pose, (x, y, z, w) = np.eye(4), quaternion / np.linalg.norm(quaternion)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    pose[:3, :3] += 2.0 * (w * cross + cross @ cross)
+    pose[:3, 3] = place
+    return pose
+
+
+PEERS = {"rko_lio": rko, "rko_lio_fine": rko_fine, "genz_lio": genz, "kiss_icp": kiss, "kiss_slam": kiss_slam}
 
 if __name__ == "__main__":
     main()

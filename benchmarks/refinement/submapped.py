@@ -1,10 +1,12 @@
-"""Submaps of a cast walk as `process` keeps them: once, and kept beside the walk.
+"""Submaps of a cast walk as `process` keeps them: made once for an odometry's poses, and kept beside the walk.
 
 The odometry's poses are those of its run over the walk (`ours_1.npz`); between two of them the carrier moves along a
 spline, so that a sweep is deskewed without running the odometry again.
 """
 
 from __future__ import annotations
+
+import zlib
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +24,8 @@ KNOT_NS = 1_000_000
 
 def submaps_of(walk: Walk, estimates: list[OdometryEstimate]) -> list[Submap]:
     """Numbered as the estimates, whose stamps are walk time."""
-    folder = walk.folder / "submaps"
+    poses = zlib.crc32(np.array([one.position_m for one in estimates]).tobytes())
+    folder = walk.folder / f"submaps_{poses:08x}"
     if not folder.exists():
         draft = folder.with_suffix(".draft")
         _write(walk, estimates, SubmapWriter(draft))
