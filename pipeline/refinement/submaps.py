@@ -25,7 +25,7 @@ Points = npt.NDArray[np.float32]
 
 
 class SubmapWriter:
-    """Takes sweeps in order of time, writes a file a submap: 0.7 MB for ten metres."""
+    """Takes sweeps in order of time, writes a file a submap: 1.7 MB for ten metres."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
