@@ -64,7 +64,9 @@ def test_the_products_of_a_refinement_are_the_same_map_on_its_trajectory(recordi
     first = find_map(products, Config())
     (products / "refined" / "work" / "refinement").mkdir(parents=True)
     count, up = 7, np.array([0.0, 0.0, 30.0])
-    moved = Placement((47.0, 8.0, 500.0), np.tile(up, (count, 1)), np.zeros(count), np.zeros((count, 6, 6)))
+    moved = Placement(
+        (47.0, 8.0, 500.0), np.tile(up, (count, 1)), np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 6, 6))
+    )
     write_placement(products / "refined" / "work" / "refinement" / PLACEMENT, moved)
     refined = find_map(products / "refined", Config())
     assert (refined.folder, refined.source.name) == (products / "refined" / "inventory", "walk, refined")
