@@ -4,8 +4,8 @@
 
 INPUT: xyz (n, 3) float32, ends (submaps,). OUTPUT, of every closure with as many inliers as it asks for by itself: onto
 (k, 2) earlier submap and later one, inliers (k,), poses (k, 4, 4) from the points of the later one to those of the
-earlier one; and seconds of processor time. It is told which points are ground: by itself it takes trunks for it, and
-lays submaps on their sides.
+earlier one; and seconds of processor time. It is told which points are ground: in made-up stands it takes trunks
+for it by itself, and lays submaps on their sides.
 """
 
 from __future__ import annotations
