@@ -42,10 +42,10 @@ class Walk:
         return pose
 
 
-def rounds(length_m: float, radius_m: float, seed: int, drift: float = 1.0) -> Walk:
-    """drift: times the usual one."""
+def rounds(length_m: float, radius_m: float, seed: int, drift: float = 1.0, begin_rad: float = 0.0) -> Walk:
+    """drift: times the usual one. begin_rad: where on the circle."""
     way_m = np.arange(0.0, length_m, STEP_M)
-    angle = way_m / radius_m
+    angle = way_m / radius_m + begin_rad
     positions = radius_m * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     yaw = angle + math.pi / 2.0
     return Walk(way_m / SPEED_M_S, positions, yaw, _odometry(way_m, positions, yaw, drift, seed))
