@@ -11,6 +11,7 @@ from edge import __version__
 from edge.batch.plan import Step
 from edge.config import Config
 from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
+from edge.process.looked_with import looked_with
 from edge.process.process import Task, process
 from edge.process.product_facts import PRODUCTS_JSON, REPORT, ProductFacts, read_facts
 from edge.process.watch import Watch
@@ -34,6 +35,7 @@ def work(step: Step, config: Config, watch: Watch) -> Finished:
     """Do it, or find that it is done. EdgeError, DetectionError with the session's own reason."""
     begun_s = time.monotonic()
     task = Task([step.session])
+    config = looked_with(config, None, [task.folder])
     if step.stage == "report":
         page, redone = _report(task, config, watch, refined=step.refined)
         return Finished(str(page), redone, time.monotonic() - begun_s)

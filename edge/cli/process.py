@@ -13,7 +13,7 @@ from rich.markup import escape
 from edge.cli import exit_codes
 from edge.cli.stage_bar import StageBar
 from edge.cli.words import console
-from edge.config import Config, load
+from edge.config import load
 from edge.errors import UsageError
 from edge.words import duration
 
@@ -40,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-gnss", action="store_true", help="leave the fixes out: a local map")
     parser.add_argument(
-        "--detect", metavar="MODEL", help='ONNX file of the detector, "demo" for ours, "" for none (detection.model)'
+        "--detect",
+        metavar="MODEL",
+        help='ONNX file of the detector, "demo" for ours, "" for none (default: detection.model, or as the last time)',
     )
     parser.add_argument("--fresh", action="store_true", help="do again what was done before")
     parser.add_argument("--clean", action="store_true", help="take the files between the stages away at the end")
@@ -55,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Warnings when there is something to look at: no georeference, damage, sweeps without an estimate."""
+    from edge.process.looked_with import looked_with
     from edge.process.process import Task, clean, process
     from edge.replay.replay import ReplayOptions
     from edge.replay.topics import Wanted
@@ -64,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     task = Task(args.recording, args.output, not args.no_gnss, args.fresh, options)
     out = console(stderr=args.json)
     with StageBar(quiet=args.json) as bar:
-        done = process(task, _config(args), bar)
+        done = process(task, looked_with(load(args.config), args.detect, [task.folder]), bar)
     if args.clean:
         clean(task)
     facts = done.facts
@@ -82,13 +85,6 @@ def run(args: argparse.Namespace) -> int:
             out.print(f"  {escape(str(done.folder / name))}  [dim]{escape(meaning)}[/]", highlight=False)
     poor = facts.datum is None and not args.no_gnss
     return exit_codes.WARNINGS if poor or facts.estimates < 0.9 * facts.sweeps else exit_codes.GOOD
-
-
-def _config(args: argparse.Namespace) -> Config:
-    config = load(args.config)
-    if args.detect is None:
-        return config
-    return msgspec.structs.replace(config, detection=msgspec.structs.replace(config.detection, model=args.detect))
 
 
 def _told(facts: ProductFacts, redone: tuple[str, ...]) -> str:

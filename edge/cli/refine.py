@@ -39,16 +39,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="of several sessions (default: beside the first one)")
     parser.add_argument("--constraints", type=Path, metavar="FILE", help="the analyst's corrections")
+    parser.add_argument(
+        "--detect", metavar="MODEL", help='detector, "" for none (default: detection.model, or that of `process`)'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Warnings where a session could not be put on the Earth."""
+    from edge.process.looked_with import looked_with
     from edge.process.process import Task
     from edge.process.refine import refine
     from edge.process.together import refine_together
 
     logging.getLogger("pyogrio").setLevel(logging.WARNING)  # it counts every record it writes
-    config, tasks = load(args.config), [Task([session]) for session in args.session]
+    tasks = [Task([session]) for session in args.session]
+    config = looked_with(load(args.config), args.detect, [task.folder for task in tasks])
     if args.out is not None and len(tasks) == 1:
         raise UsageError("--out: it is for several sessions; one has its refinement among its products")
     with StageBar(quiet=args.json) as bar:

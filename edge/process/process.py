@@ -16,6 +16,7 @@ from edge.errors import EdgeError
 from edge.process.checkpoint import Checkpoint, alone, fingerprint, key_of
 from edge.process.estimators import Estimators, estimators, fusion_config, odometry_config
 from edge.process.fusion_stage import FusionStage
+from edge.process.looked_with import remember
 from edge.process.odometry_stage import OdometryFacts, OdometryStage
 from edge.process.places import Places
 from edge.process.product_facts import PRODUCTS_JSON, ProductFacts, read_facts
@@ -172,6 +173,7 @@ class _Work:
 
         assert self.detector is not None
         DetectionStage(self.task.targets, self.config, self.detector).run(folder, self.watch.advance)
+        remember(self.checkpoint.folder, self.config.detection.model)
 
     def _grounding(self, folder: Path) -> None:
         ground(self.task, self.config, self.places, folder, self.watch.advance)

@@ -137,3 +137,16 @@ def test_the_command_takes_a_model(recording, model, capsys, monkeypatch):
     assert told["redone"] == ["odometry", "fusion", "detection", "grounding", "products"]
     assert main(["process", str(recording), "--detect", str(model) + "x"]) == 1
     assert "cannot be read" in capsys.readouterr().err
+
+
+def test_a_model_once_named_is_used_again_until_none_is_asked_for(recording, model, capsys, monkeypatch):
+    monkeypatch.setattr(module.process, "__defaults__", (None, fakes()))
+    monkeypatch.chdir(model.parent)
+    looked = []
+    for more in (["--detect", model.name], [], ["--detect", ""], []):
+        assert main(["process", str(recording), "--json", *more]) == 0
+        told = json.loads(capsys.readouterr().out)
+        looked.append((told["detection"] is not None, told["redone"]))
+        monkeypatch.chdir(recording.parent)
+    assert [one for one, _ in looked] == [True, True, False, False]
+    assert looked[1][1] == looked[3][1] == []
