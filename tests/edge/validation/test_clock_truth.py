@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from edge.config import Config
+from edge.config import Config, Recording
 from edge.errors import FormatError
 from edge.recording.anchor import Anchor
 from edge.recording.messages import Diagnostics, DiagnosticStatus, Level
@@ -27,7 +27,8 @@ def diagnostics(second, error_ns):
 @pytest.fixture
 def session(tmp_path):
     anchor = Anchor(utc_ns=1_800_000_000 * S, monotonic_ns=5 * S)
-    recorder = SessionRecorder(tmp_path / "walk", SessionAbout(mission="walk"), Config(), anchor)
+    config = Config(recording=Recording(min_free_mib=0, min_free_percent=0.0))
+    recorder = SessionRecorder(tmp_path / "walk", SessionAbout(mission="walk"), config, anchor)
     recorder.start()
     for second in range(40):
         recorder.offer(diagnostics(second, error_ns=2_000_000))
