@@ -22,8 +22,11 @@ def remember(work: Path, model: str) -> None:
 
 
 def looked_with(config: Config, asked: str | None, products: Iterable[Path]) -> Config:
-    """asked: of the command line, "" for no detector, which is remembered too; None for what is configured or, where
-    nothing is, the detector of the last run. products: folders of the sessions."""
+    """The configuration with the detector that is meant. products: folders of the sessions.
+
+    asked: of the command line, "" for no detector, which also forgets the last one; None for what is configured or,
+    where nothing is, the detector of the last run.
+    """
     model = config.detection.model if asked is None else asked
     for folder in products:
         memory = folder / "work" / MODEL

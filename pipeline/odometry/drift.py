@@ -31,10 +31,8 @@ class Drift:
     def move(self, step_m: Doubles, factor: float = 1.0, weak: Doubles = NONE, tilt: float = 0.0) -> None:
         """The sensor moved by (3,) in `odom`. factor: widens the walk where the scan was no good.
 
-        tilt: variance (rad^2) of the vertical along the step (`tilt_along`).
-
         weak: rows (k, 3), directions that the scan did not show, as long (0 to 1) as it was followed there all the
-        same: the error grows with the way itself.
+        same: the error grows with the way itself. tilt: variance (rad^2) of the vertical along the step (`tilt_along`).
         """
         length = float(np.linalg.norm(step_m))
         transition = np.eye(4)
