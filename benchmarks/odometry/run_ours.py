@@ -1,6 +1,6 @@
 """Our odometry over one walk, in a process of its own, so that its time and memory are its own.
 
-python -m benchmarks.odometry.run_ours FOLDER OUTPUT.npz
+python -m benchmarks.odometry.run_ours FOLDER OUTPUT.npz [FIRST_S]
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ def peak_mb() -> float:
 
 
 def main() -> None:
-    walk, target = Walk(Path(sys.argv[1])), sys.argv[2]
+    folder, target, *first_s = sys.argv[1:]
+    walk = Walk(Path(folder), *(int(value) for value in first_s))
     list(zip(range(15), run(walk, OdometryConfig()), strict=False))  # compiled kernels are loaded before the clock runs
     rows = [_row(estimate, took) for estimate, took in run(walk, OdometryConfig())]
     np.savez(target, peak_mb=peak_mb(), failed="", **{name: [row[name] for row in rows] for name in rows[0]})

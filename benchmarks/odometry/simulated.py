@@ -32,18 +32,31 @@ Doubles = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Where a cast walk lies. points.npy: structured (n,); ends.npy (scans,); imu.npy (m, 7); truth.npy (k, 8)."""
+    """Where a cast walk lies. points.raw: `POINT` (n,); ends.npy (scans,); imu.npy (m, 12); truth.npy (k, 10).
+
+    first_s: its sweeps of so many seconds alone, None for all.
+    """
 
     folder: Path
+    first_s: int | None = None
 
     @property
     def scan_count(self) -> int:
         """How many sweeps."""
-        return len(np.load(self.folder / "ends.npy", mmap_mode="r"))
+        return len(self._ends())
+
+    @property
+    def part(self) -> str:
+        """For the names of files that are of these sweeps only."""
+        return "" if self.first_s is None else f"_{self.first_s}s"
+
+    def _ends(self) -> npt.NDArray[np.int64]:
+        ends: npt.NDArray[np.int64] = np.load(self.folder / "ends.npy")
+        return ends if self.first_s is None else ends[: self.first_s * 1_000_000_000 // SCAN_NS]
 
     def scans(self) -> Iterator[LidarScan]:
         """The sweeps in order."""
-        counts = np.diff(np.load(self.folder / "ends.npy"), prepend=0)
+        counts = np.diff(self._ends(), prepend=0)
         with (self.folder / "points.raw").open("rb") as file:
             for k, count in enumerate(counts.tolist()):
                 part = np.fromfile(file, POINT, count)

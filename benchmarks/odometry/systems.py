@@ -21,6 +21,7 @@ def run(one: Walk, system: str, target: Path, python: str, threads: int = 1) -> 
     environment = os.environ | {"NUMBA_NUM_THREADS": count, "OMP_NUM_THREADS": count, "OPENBLAS_NUM_THREADS": "1"}
     if system == "ours":
         command = [sys.executable, "-m", "benchmarks.odometry.run_ours", str(one.folder), str(target)]
+        command += [] if one.first_s is None else [str(one.first_s)]
     else:
         script = Path(__file__).with_name("run_peer.py")
         command = [python, str(script), system, str(exported(one)), str(target), count]
@@ -34,7 +35,7 @@ def run(one: Walk, system: str, target: Path, python: str, threads: int = 1) -> 
 
 def exported(one: Walk) -> Path:
     """The walk as `run_peer.py` reads it."""
-    path = one.folder / "peer_input.npz"
+    path = one.folder / f"peer_input{one.part}.npz"
     if not path.exists():
         scans = list(one.scans())
         imu = np.load(one.folder / "imu.npy")
