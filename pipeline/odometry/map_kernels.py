@@ -21,11 +21,12 @@ BITS = 20
 HALF = 1 << (BITS - 1)
 FIELD = (1 << BITS) - 1
 COUNT, MEAN, SEEN, BRIGHTEST, INTENSITY, SCATTER = 0, 1, 4, 5, 6, 7
-DERIVED, VARIANCES, DIRECTIONS = 13, 14, 17
+DERIVED, VARIANCES, DIRECTIONS, VIEW = 13, 14, 17, 26
 VOXEL = 32
-"""Columns of a voxel: count, mean from its low corner, scan that saw it last while it was thin, greatest and mean
+"""Columns of a voxel: count, mean from its low corner, mean of the scans that its points are of, greatest and mean
 intensity, scatter xx xy xz yy yz zz; then its shape: the count it was derived from, three variances ascending, their
-directions row by row. 128 bytes: what a look-up waits for is memory, so all of it lies in two cache lines."""
+directions row by row; then the mean of the horizontal unit vectors (x, y) from its points to the sensor. 128 bytes:
+what a look-up waits for is memory, so all of it lies in two cache lines."""
 THIN = 4.0
 USED, REFUSED, CURSOR, FREE, SCAN = 0, 1, 2, 3, 4
 ROUNDS = 6
@@ -92,7 +93,7 @@ def _settle(grid: MapArrays, slot: int, key: int) -> int:
     row = grid.free[numbers[FREE]]
     grid.slots[slot, 0] = key
     grid.slots[slot, 1] = row
-    for k in range(DIRECTIONS):
+    for k in range(VOXEL):
         grid.voxels[row, k] = 0.0
     return row
 
@@ -138,12 +139,16 @@ def insert(
     levels, count = len(sizes), len(clusters)
     rows = np.empty((count, levels), np.int64)
     offsets = np.empty((count, levels, 3))
+    views = np.empty((count, 2))
     for n in range(count):
         x, y, z = clusters[n, 1], clusters[n, 2], clusters[n, 3]
         mx = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + position[0]
         my = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + position[1]
         mz = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + position[2]
-        sector = side(mx - position[0], my - position[1]) if sides > 1 else 0
+        dx, dy = mx - position[0], my - position[1]
+        across = math.sqrt(dx * dx + dy * dy) + 1e-6
+        views[n, 0], views[n, 1] = -dx / across, -dy / across
+        sector = side(dx, dy) if sides > 1 else 0
         for level in range(levels):
             size = sizes[level]
             ix, iy, iz = math.floor(mx / size), math.floor(my / size), math.floor(mz / size)
@@ -168,9 +173,10 @@ def insert(
             had = voxels[row, COUNT]
             if had >= most:
                 continue
-            if had < THIN:
-                voxels[row, SEEN] = scan
             part = points / (had + points)
+            voxels[row, SEEN] += part * (scan - voxels[row, SEEN])
+            voxels[row, VIEW] += part * (views[n, 0] - voxels[row, VIEW])
+            voxels[row, VIEW + 1] += part * (views[n, 1] - voxels[row, VIEW + 1])
             cross = had * part
             dx = offsets[n, level, 0] - voxels[row, MEAN]
             dy = offsets[n, level, 1] - voxels[row, MEAN + 1]

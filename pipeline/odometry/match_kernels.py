@@ -21,6 +21,7 @@ from pipeline.odometry.map_kernels import (
     SEEN,
     SIDES,
     VARIANCES,
+    VIEW,
     MapArrays,
     derive,
     pack,
@@ -47,7 +48,7 @@ def match(
     The update is -A^-1 b. Levels before `first_level` are left out.
     settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas), widest direction and prior variance
     as shares of the squared size, weight of the prior in points, most directions, scans after which a voxel counts in
-    full, share of that which it counts before.
+    full, share of that which it counts before, how round (m) things are.
     """
     a, b, numbers, h = np.zeros((6, 6)), np.zeros(6), np.zeros(5), np.empty(6)
     fewest, floor, huber, gate = settings[0], settings[1] ** 2, settings[2], settings[3] ** 2
@@ -58,7 +59,9 @@ def match(
         wy = rotation[1, 0] * qx + rotation[1, 1] * qy + rotation[1, 2] * qz + position[1]
         wz = rotation[2, 0] * qx + rotation[2, 1] * qy + rotation[2, 2] * qz + position[2]
         row, size, rx, ry, rz = np.int64(-1), 0.0, 0.0, 0.0, 0.0
-        sector = side(wx - position[0], wy - position[1]) if sides > 1 else 0
+        vx, vy = position[0] - wx, position[1] - wy
+        across = math.sqrt(vx * vx + vy * vy) + 1e-6
+        sector = side(-vx, -vy) if sides > 1 else 0
         for level in range(first_level, len(sizes)):
             size = sizes[level]
             ix, iy, iz = math.floor(wx / size), math.floor(wy / size), math.floor(wz / size)
@@ -71,6 +74,11 @@ def match(
                 break
         if row < 0:
             continue
+        # What is round shows another part of itself from elsewhere: it lies deeper, seen as the voxel was.
+        mx, my = float(voxels[row, VIEW]), float(voxels[row, VIEW + 1])
+        deeper = settings[10] * (1.0 - (mx * vx + my * vy) / across)
+        rx += deeper * mx
+        ry += deeper * my
         if voxels[row, COUNT] > 1.2 * voxels[row, DERIVED]:
             derive(voxels[row], settings[5] * size * size, settings[6])
         share = 1.0 / clusters[n, 0] + 1.0 / voxels[row, COUNT]

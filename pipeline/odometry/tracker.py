@@ -81,6 +81,7 @@ class Tracker:
                 one.directions,
                 one.settled_scans,
                 one.fresh_share,
+                one.round_m,
             ]
         )
 

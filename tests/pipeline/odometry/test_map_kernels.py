@@ -123,8 +123,8 @@ def test_the_table_holds_what_a_dictionary_would(done):
         kernels.insert(grid, row[None], np.eye(3), eye, SIZES[:1], 4, 1e9, scan)
         key = kernels.pack(*cell, kernels.side(1.0, 1.0))
         if key in model or len(model) < 12:
-            count, seen = model.get(key, (0, -1))
-            model[key] = (count + points, scan if count < kernels.THIN else seen)
+            count, seen = model.get(key, (0, 0.0))
+            model[key] = (count + points, (count * seen + points * scan) / (count + points))
         else:
             refused += 1
         if forget:
@@ -142,7 +142,8 @@ def test_the_table_holds_what_a_dictionary_would(done):
         assert len(set(grid.free[: grid.numbers[kernels.FREE]].tolist())) == 12 - len(model)
         for one, (count, seen) in model.items():
             voxel = found(grid, one)
-            assert (voxel[kernels.COUNT], voxel[kernels.SEEN]) == (count, seen)
+            assert (voxel[kernels.COUNT], voxel[kernels.SEEN]) == (count, pytest.approx(seen, rel=1e-5))
+            np.testing.assert_allclose(voxel[kernels.VIEW : kernels.VIEW + 2], -np.sqrt([0.5, 0.5]), atol=0.05)
 
 
 def corner(key):

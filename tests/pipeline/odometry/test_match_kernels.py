@@ -25,6 +25,7 @@ SETTINGS = np.array(
         CONFIG.directions,
         SCANS - 2,
         CONFIG.fresh_share,
+        CONFIG.round_m,
     ]
 )
 UNBOUNDED = np.array([*SETTINGS[:2], np.inf, np.inf, *SETTINGS[4:]])
@@ -68,7 +69,7 @@ def voxels(grown):
 
 def residuals(grown, clusters, rotation, position, settings=SETTINGS):
     """Slow and obvious: for each cluster that meets a voxel, (q, r, [(direction, weight)], distance)."""
-    fewest, floor, huber, gate, wide, prior, extra, most, settled, fresh = settings
+    fewest, floor, huber, gate, wide, prior, extra, most, settled, fresh, off = settings
     table = voxels(grown)
     for row in clusters:
         q = row[1:4]
@@ -86,6 +87,9 @@ def residuals(grown, clusters, rotation, position, settings=SETTINGS):
             values, vectors = np.linalg.eigh(scatter)
             values = (count * values + extra * prior * size**2) / (count + extra)
             r = world - cell * size - voxel[kernels.MEAN : kernels.MEAN + 3]
+            view = (position - world)[:2] / np.linalg.norm((position - world)[:2])
+            before = voxel[kernels.VIEW : kernels.VIEW + 2]
+            r[:2] += off * (1.0 - view @ before) * before
             share, used = 1.0 / row[0] + 1.0 / count, (values < wide * size**2) & (np.arange(3) < most)
             variance = values * share + floor**2
             distance = float(np.sum(((r @ vectors) ** 2 / variance)[used]))
@@ -159,3 +163,30 @@ def test_nothing_in_view_says_nothing(scene):
     assert not a.any()
     assert not b.any()
     assert not numbers.any()
+
+
+def half_stems(seed, position, count=8000):
+    """Points of the sides that stems of 8 cm show to a sensor at a position, and of a floor, in its frame."""
+    random = np.random.default_rng(seed)
+    middles = np.random.default_rng(5).uniform(5.0, 10.0, (30, 2))[random.integers(0, 30, count)]
+    towards = np.arctan2(*(position[:2] - middles).T[::-1]) + random.uniform(-1.4, 1.4, count)
+    stems = middles + 0.08 * np.column_stack([np.cos(towards), np.sin(towards)])
+    floor = np.column_stack([random.uniform(5.0, 10.0, (count, 2)), np.full(count, -1.3)])
+    both = np.concatenate([np.column_stack([stems, random.uniform(-1.2, 3.0, count)]), floor])
+    return both + random.normal(0, 0.01, both.shape)
+
+
+def test_stems_seen_from_elsewhere_do_not_push_away():
+    grown, there = VoxelMap(MapConfig(voxels_most=50_000)), np.array([4.5, -3.0, 0.0])
+    for seed in range(SCANS):
+        grown.insert(clusters_of(half_stems(seed, np.zeros(3)), np.eye(3), np.zeros(3)), np.eye(3), np.zeros(3))
+    clusters = clusters_of(half_stems(9, there), np.eye(3), there)
+    pushed = []
+    for off in (0.0, CONFIG.round_m):
+        rotation, position, settings = np.eye(3), there, np.array([*SETTINGS[:-1], off])
+        for _ in range(8):
+            a, b, _ = match(grown.arrays, clusters, rotation, position, grown.sizes, 4, 0, settings)
+            step = -np.linalg.solve(a, b)
+            rotation, position = rotation @ so3.exp(step[:3]), position + step[3:]
+        pushed.append(float(np.linalg.norm(position - there)))
+    assert pushed[1] < 0.6 * pushed[0]
