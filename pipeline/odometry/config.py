@@ -66,9 +66,8 @@ class MatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fresh_share: float = 0.05
     """Of a voxel that has just been laid down."""
     round_m: float = 0.028
-    """What is seen of a stem lies off its middle by this, towards the sensor; from elsewhere, in another direction. In
-    open and mixed forests, where the view has turned by 37, 52, 75 degrees, points lie 5, 12, 23 mm deeper than before,
-    this times 1 - cos; from voxels seen the same way all the time 1 mm."""
+    """The middle of what is seen of a stem lies off its own by this, towards the sensor; from elsewhere it lies deeper,
+    by this times 1 - cos of the turn: by 5, 12 and 23 mm in the mean where the view has turned by 37, 52 and 75 deg."""
     effective: float = 150.0
     """So many residuals a scan count as independent."""
     least_share: float = 0.15

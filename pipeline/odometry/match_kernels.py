@@ -48,7 +48,7 @@ def match(
     The update is -A^-1 b. Levels before `first_level` are left out.
     settings: fewest points of a voxel, floor (m), Huber (sigmas), gate (sigmas), widest direction and prior variance
     as shares of the squared size, weight of the prior in points, most directions, scans after which a voxel counts in
-    full, share of that which it counts before, how round (m) things are.
+    full, share of that which it counts before, how far (m) the middle of what is seen of a thing lies off its own.
     """
     a, b, numbers, h = np.zeros((6, 6)), np.zeros(6), np.zeros(5), np.empty(6)
     fewest, floor, huber, gate = settings[0], settings[1] ** 2, settings[2], settings[3] ** 2
@@ -74,9 +74,10 @@ def match(
                 break
         if row < 0:
             continue
-        # What is round shows another part of itself from elsewhere: it lies deeper, seen as the voxel was.
+        # The part of a round thing that is seen has its middle off the thing's, towards the sensor: by `round` times
+        # the mean cosine of the views, as seen from where the voxel was. From elsewhere that is less.
         mx, my = float(voxels[row, VIEW]), float(voxels[row, VIEW + 1])
-        deeper = settings[10] * (1.0 - (mx * vx + my * vy) / across)
+        deeper = settings[10] * (1.0 - (mx * vx + my * vy) / (across * (mx * mx + my * my) + 1e-9))
         rx += deeper * mx
         ry += deeper * my
         if voxels[row, COUNT] > 1.2 * voxels[row, DERIVED]:
