@@ -13,6 +13,7 @@ class ImuConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gyro_density_rad_s: float = 1.5e-4
     accel_density_m_s2: float = 3e-3
     gyro_walk_rad_s: float = 1e-4
+    """Five times that of a sensor at rest: errors of scale and alignment come and go with the turns, as a bias does."""
     accel_walk_m_s2: float = 3e-4
     gyro_share: float = 3e-3
     """Error of scale and alignment, as a share of the rate."""
