@@ -66,14 +66,26 @@ def test_a_ride_can_be_joined_too(tmp_path):
     assert tilt_deg < 1.0
 
 
-@pytest.mark.slow
-def test_a_flight_can_be_joined_within_what_is_stated(tmp_path):
+@pytest.fixture(scope="module")
+def joined_flight(tmp_path_factory):
     """It begins a degree or two off the vertical and climbs by that; it says that the scans leave a direction open."""
-    tilt_deg, outcome = joined_on_the_way("uav", tmp_path)
+    return joined_on_the_way("uav", tmp_path_factory.mktemp("flight"))
+
+
+@pytest.mark.slow
+def test_a_flight_can_be_joined(joined_flight):
+    tilt_deg, outcome = joined_flight
     assert outcome.end_m < 0.5
     assert outcome.outside < 0.05
     assert tilt_deg < 3.0
     assert outcome.statuses[Status.DEGENERATE] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="ends 0.36 m off with 0.16 stated")
+def test_a_joined_flight_ends_within_twice_what_is_stated(joined_flight):
+    _, outcome = joined_flight
+    assert outcome.end_m < 2.0 * outcome.end_sigma_m < 4.0
 
 
 def refusal(streams, fault):
