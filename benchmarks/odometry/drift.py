@@ -2,10 +2,11 @@
 
     python -m benchmarks.odometry.drift --cache DIR [--scenarios loop_1200] [--seeds 1 2 3] [--probe S]
 
-First the yaw that is lost over stretches of the way, and the error split: what the yaw alone would have done, and what
-is left without it. With `--probe` three runs over the first S seconds instead, in each of which the map is laid down
-otherwise: where the truth has it (how well a scan is placed in a perfect map), as always, and turned by a tenth of a
-degree from half-way on (how soon the map follows: its age).
+First the yaw that is lost over stretches of the way, and the error beside the way split: what the yaw alone would have
+done, and what is left without it; then the height's, what the tilt alone would have done, and the stated sigma. With
+`--probe` three runs over the first S seconds instead, in each of which the map is laid down otherwise: where the truth
+has it (how well a scan is placed in a perfect map), as always, and turned by a tenth of a degree from half-way on (how
+soon the map follows: its age).
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Placed: TypeAlias = Callable[[int, Doubles, Doubles], tuple[Doubles, Doubles]]
 def main() -> None:
     options = _options()
     heads = [f"yaw over {stretch} m, mdeg" for stretch in STRETCHES_M]
-    heads += ["error at the end, m", "by the yaw", "without"]
+    heads += ["error at the end, m", "by the yaw", "without", "height, m", "by the tilt", "stated"]
     if options.probe:
         heads = ["yaw in a true map: mdeg", "mean of 10 s", "age of the map, s"]
     print(f"| | {' | '.join(heads)} |\n{'|---' * (len(heads) + 1)}|", flush=True)
@@ -69,6 +70,9 @@ def _lost(one: Walk) -> Iterator[str]:
     total = start.apply(found["position"] - found["position"][0]) - (truth - truth[0])
     for error in (total[-1], by_yaw, without.sum(axis=0)):
         yield f"{np.linalg.norm(error[:2]):.2f}"
+    by_tilt = (turn[:-1].apply(steps) - steps).sum(axis=0)
+    for height in (total[-1, 2], by_tilt[2], np.sqrt(found["covariance"][-1, 5, 5])):
+        yield f"{height:.2f}"
 
 
 def _probed(one: Walk, seconds: int) -> Iterator[str]:

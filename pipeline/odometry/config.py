@@ -12,9 +12,16 @@ class ImuConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     gyro_density_rad_s: float = 1.5e-4
     accel_density_m_s2: float = 3e-3
+    joined_s: float = 10.0
+    joined_accel_density_m_s2: float = 2e-2
+    """After a start on the way, for `joined_s`: the map was laid down before the vertical was known, and is warped in a
+    way that lasts and looks like a push."""
     gyro_walk_rad_s: float = 1e-4
     """Five times that of a sensor at rest: errors of scale and alignment come and go with the turns, as a bias does."""
     accel_walk_m_s2: float = 3e-4
+    gravity_walk_rad: float = 5e-5
+    """A root second. The map tilts a little as it is laid down; held still, gravity would put that on the
+    accelerometer's bias, and the way would climb by it until the next turn."""
     gyro_share: float = 3e-3
     """Error of scale and alignment, as a share of the rate."""
     accel_share: float = 3e-3
@@ -99,7 +106,9 @@ class DriftConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     yaw_deg_per_root_m: float = 0.004
     horizontal: float = 0.0015
     vertical: float = 0.001
+    """On top of what the tilt lifts."""
     correlated_m: float = 50.0
+    tilt_lasts_m: float = 500.0
     weak: float = 0.3
     """Share of the way that may be wrong along a direction that the scans do not show."""
 

@@ -1,8 +1,8 @@
 """Error that a map built by its own poses cannot see: it grows with the way travelled.
 
 The filter's covariance is that of the pose within its map, and never grows. What is published adds the drift of the
-map itself: yaw and position walk at random with distance, and a yaw error swings all that comes after it. While the
-vertical is not known well, after a start on the way above all, level ground climbs or falls by the tilt.
+map itself: yaw and position walk at random with distance, and a yaw error swings all that comes after it. Level ground
+climbs or falls by the error of the vertical, which turns with the sensor as the accelerometer's bias does, and lasts.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Drift:
         """The sensor moved by (3,) in `odom`. factor: widens the walk where the scan was no good.
 
         weak: rows (k, 3), directions that the scan did not show, as long (0 to 1) as it was followed there all the
-        same: the error grows with the way itself. tilt: variance (rad^2) of the vertical along the step (`tilt_along`).
+        same: the error grows with the way itself. tilt: variance (rad^2) of the vertical about either axis.
         """
         length = float(np.linalg.norm(step_m))
         transition = np.eye(4)
@@ -48,17 +48,17 @@ class Drift:
         before_m, self._unseen_m = self._unseen_m, self._unseen_m + length if len(weak) else 0.0
         if len(weak):
             grown[1:, 1:] += config.weak**2 * (self._unseen_m**2 - before_m**2) * weak.T @ weak
-        grown[3, 3] += self._climbed(length, max(tilt - 0.5 * config.vertical**2, 0.0))
+        grown[3, 3] += self._climbed(length, tilt)
         self._covariance = grown
 
     def _climbed(self, length_m: float, tilt: float) -> float:
-        """By how much the variance of the height grows over a step, `vertical` of any way apart.
+        """By how much the variance of the height grows over a step, `vertical` apart.
 
-        An error of the tilt lasts, so the height errs with it along the whole way (a Gauss-Markov process over
-        `correlated_m`); as the tilt becomes known, what the two have in common shrinks as its variance does.
+        The height errs with the tilt along the whole way (a Gauss-Markov process over `tilt_lasts_m`); as the tilt
+        becomes known, what the two have in common shrinks as its variance does.
         """
         known = min(tilt / self._tilt, 1.0) if self._tilt > 0.0 else 0.0
-        lean = self._lean * known * math.exp(-length_m / self._config.correlated_m)
+        lean = self._lean * known * math.exp(-length_m / self._config.tilt_lasts_m)
         self._tilt, self._lean = tilt, lean + tilt * length_m
         return 2.0 * lean * length_m + tilt * length_m**2
 
@@ -72,12 +72,6 @@ class Drift:
         map_to_error[:3, 0] = rotation.T[:, 2]
         map_to_error[3:, 1:] = np.eye(3)
         return covariance + map_to_error @ self._covariance @ map_to_error.T
-
-
-def tilt_along(step_m: Doubles, axes: Doubles, covariance: Doubles) -> float:
-    """Variance (rad^2) of the vertical along a step (3,), given that of gravity (2, 2) about axes (3, 2) of `odom`."""
-    across = axes.T @ np.array([step_m[1], -step_m[0], 0.0])
-    return float(across @ covariance @ across / max(float(step_m @ step_m), 1e-12))
 
 
 def level(gravity: Doubles) -> Doubles:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.odometry import so3
 from pipeline.odometry.config import ImuConfig, MatchConfig
-from pipeline.odometry.propagation_kernels import propagate
+from pipeline.odometry.propagation_kernels import Noise, propagate
 from pipeline.odometry.so3 import Doubles
 from pipeline.odometry.state import ATTITUDE, ERRORS, POSITION, State, gravity_axes
 
@@ -67,31 +67,38 @@ class _Solution:
 
 
 class Filter:
-    """State and covariance (17, 17) of the error as `state` orders it."""
+    """State and covariance (17, 17) of the error as `state` orders it.
 
-    def __init__(self, state: State, covariance: Doubles, imu: ImuConfig, match: MatchConfig) -> None:
+    joined: begun on the way; the accelerometer counts for less at first.
+    """
+
+    def __init__(
+        self, state: State, covariance: Doubles, imu: ImuConfig, match: MatchConfig, *, joined: bool = False
+    ) -> None:
         self.state = state
         self.covariance = covariance
         self._imu = imu
         self._match = match
         self._begin = state, covariance, np.zeros((1, 7))
-        self._noise = np.array(
-            [
-                imu.gyro_density_rad_s,
-                imu.accel_density_m_s2,
-                imu.gyro_walk_rad_s,
-                imu.accel_walk_m_s2,
-                imu.gyro_share,
-                imu.accel_share,
-                imu.gyro_range_rad_s,
-                imu.accel_range_m_s2,
-                imu.longest_step_s,
-            ]
+        self._noise = Noise(
+            imu.gyro_density_rad_s,
+            imu.accel_density_m_s2,
+            imu.gyro_walk_rad_s,
+            imu.accel_walk_m_s2,
+            imu.gravity_walk_rad,
+            imu.gyro_share,
+            imu.accel_share,
+            imu.gyro_range_rad_s,
+            imu.accel_range_m_s2,
+            imu.longest_step_s,
         )
+        self._joined = self._noise._replace(accel_density=imu.joined_accel_density_m_s2)
+        self._settles_s = imu.joined_s if joined else 0.0
 
     def propagate(self, samples: Doubles) -> Doubles:
         """Through samples (m, 7): time (s), rate, force. Gives the knots (m, KNOT) for deskewing."""
         self._begin = self.state, self.covariance, samples
+        self._settles_s -= float(samples[-1, 0] - samples[0, 0])
         flat, self.covariance, knots = self._propagated(self.state, self.covariance, samples)
         self.state = State.from_flat(flat)
         return knots
@@ -150,5 +157,6 @@ class Filter:
 
     def _propagated(self, state: State, covariance: Doubles, samples: Doubles) -> tuple[Doubles, Doubles, Doubles]:
         axes = gravity_axes(state.gravity_m_s2)
-        flat, grown, knots = propagate(state.flat(), covariance, axes, samples, self._noise)
+        noise = self._joined if self._settles_s > 0.0 else self._noise
+        flat, grown, knots = propagate(state.flat(), covariance, axes, samples, noise)
         return np.asarray(flat), np.asarray(grown), np.asarray(knots)

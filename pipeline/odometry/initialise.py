@@ -67,7 +67,7 @@ def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: Odom
     state = replace(state, velocity_m_s=rough_velocity(clouds, times_s))
     moved, matched, tracker, found = 0.0, 1.0, None, None
     for _ in range(config.start.passes):
-        tracker = Tracker(config, Filter(state, _covariance(MOVING), config.imu, config.match))
+        tracker = Tracker(config, Filter(state, _covariance(MOVING), config.imu, config.match, joined=True))
         pushed, shares = np.zeros(3), []
         for scan, window in zip(scans, windows, strict=True):
             before = tracker.filter.state
@@ -92,7 +92,7 @@ def start_in_motion(scans: list[LidarScan], windows: list[Doubles], config: Odom
     assert found is not None
     _accept(tracker, found, moved, matched, config)
     sigmas = MOVING | {"velocity": 0.3, "gravity": 0.03, "gyro": 3e-3}
-    return Filter(state, _covariance(sigmas), config.imu, config.match)
+    return Filter(state, _covariance(sigmas), config.imu, config.match, joined=True)
 
 
 def _clouds(

@@ -17,7 +17,7 @@ import numpy as np
 
 from drivers.messages import ImuSample, LidarScan
 from pipeline.odometry.config import OdometryConfig
-from pipeline.odometry.drift import Drift, tilt_along
+from pipeline.odometry.drift import Drift
 from pipeline.odometry.errors import StartRefused
 from pipeline.odometry.estimate import Odometry, Status
 from pipeline.odometry.fit import Fit
@@ -26,7 +26,7 @@ from pipeline.odometry.imu_buffer import ImuBuffer
 from pipeline.odometry.published import published
 from pipeline.odometry.so3 import Doubles
 from pipeline.odometry.start import Starter, end_ns
-from pipeline.odometry.state import GRAVITY, POSITION, State, gravity_axes
+from pipeline.odometry.state import GRAVITY, POSITION, State
 from pipeline.odometry.time_gate import TimeGate
 from pipeline.odometry.tracker import Tracker
 from pipeline.odometry.upright import Upright
@@ -147,8 +147,7 @@ class LidarInertialOdometry:
         gap_s = gap_s if gap_s > self._config.imu.longest_step_s else 0.0
         saturated, restarted = self._saturated(imu), self._footing.say()
         good = status is Status.TRACKING and not (saturated or gap_s)
-        axes = self._upright.turn @ gravity_axes(tracker.filter.state.gravity_m_s2)
-        tilt = tilt_along(step_m, axes, tracker.filter.covariance[GRAVITY, GRAVITY])
+        tilt = 0.5 * float(np.trace(tracker.filter.covariance[GRAVITY, GRAVITY]))
         self._drift.move(step_m, 1.0 if good else NO_GOOD, found.leaning @ self._upright.turn.T, tilt)
         estimate = published(
             stop_ns,

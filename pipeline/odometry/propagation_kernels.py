@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -16,14 +18,30 @@ GAP_GYRO, GAP_ACCEL = 0.2, 2.0
 """And where no reading is: a walker's motion over a silence."""
 
 
+class Noise(NamedTuple):
+    """Of the process, in SI units: densities are a root hertz, walks a root second, shares of rate and acceleration.
+
+    Ranges are those of the sensor. A step longer than `longest_step_s` is a gap.
+    """
+
+    gyro_density: float
+    accel_density: float
+    gyro_walk: float
+    accel_walk: float
+    gravity_walk: float
+    gyro_share: float
+    accel_share: float
+    gyro_range: float
+    accel_range: float
+    longest_step_s: float
+
+
 @njit(cache=True, nogil=True)
 def propagate(
-    state: Doubles, covariance: Doubles, axes: Doubles, imu: Doubles, noise: Doubles
+    state: Doubles, covariance: Doubles, axes: Doubles, imu: Doubles, noise: Noise
 ) -> tuple[Doubles, Doubles, Doubles]:
     """State (24,), covariance (17, 17) and knots (m, KNOT) after the samples imu (m, 7): time (s), rate, force.
 
-    noise: gyro and accel densities, gyro and accel walks, shares of rate and acceleration, ranges of gyro and accel,
-    longest step (s) that is no gap.
     Rates and forces are taken as linear between samples. Formulas: FAST-LIO2, with trapezoids.
     """
     count = len(imu)
@@ -38,7 +56,7 @@ def propagate(
     for k in range(count - 1):
         dt = imu[k + 1, 0] - imu[k, 0]
         rate = 0.5 * (imu[k, 1:4] + imu[k + 1, 1:4]) - gyro_bias
-        unheard = dt > noise[8]
+        unheard = dt > noise.longest_step_s
         if unheard:
             rate[:] = 0.0  # nobody knows: the speed is kept, the turn is not
         turn = exp(rate * dt)
@@ -94,21 +112,21 @@ def _write(
 
 
 @njit(cache=True, nogil=True)
-def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, ends: Doubles, noise: Doubles) -> None:
+def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, ends: Doubles, noise: Noise) -> None:
     """Adds the process noise of one step, between the samples `ends` (2, 7).
 
     Scale errors count as noise that stays for `CORRELATED_S`.
     """
     turning = rate[0] ** 2 + rate[1] ** 2 + rate[2] ** 2
     pushing = acceleration[0] ** 2 + acceleration[1] ** 2 + acceleration[2] ** 2
-    gyro = noise[0] ** 2 + noise[4] ** 2 * turning * CORRELATED_S
-    accel = noise[1] ** 2 + noise[5] ** 2 * pushing * CORRELATED_S
+    gyro = noise.gyro_density**2 + noise.gyro_share**2 * turning * CORRELATED_S
+    accel = noise.accel_density**2 + noise.accel_share**2 * pushing * CORRELATED_S
     for i in range(3):
-        if max(abs(ends[0, 1 + i]), abs(ends[1, 1 + i])) > 0.99 * noise[6]:
+        if max(abs(ends[0, 1 + i]), abs(ends[1, 1 + i])) > 0.99 * noise.gyro_range:
             gyro += SATURATED_GYRO**2
-        if max(abs(ends[0, 4 + i]), abs(ends[1, 4 + i])) > 0.99 * noise[7]:
+        if max(abs(ends[0, 4 + i]), abs(ends[1, 4 + i])) > 0.99 * noise.accel_range:
             accel += SATURATED_ACCEL**2
-    if dt > noise[8]:
+    if dt > noise.longest_step_s:
         gyro += GAP_GYRO**2
         accel += GAP_ACCEL**2
     for i in range(3):
@@ -117,5 +135,7 @@ def _grow(p: Doubles, dt: float, rate: Doubles, acceleration: Doubles, ends: Dou
         p[3 + i, 6 + i] += accel * dt**2 / 2.0
         p[6 + i, 3 + i] += accel * dt**2 / 2.0
         p[6 + i, 6 + i] += accel * dt
-        p[9 + i, 9 + i] += noise[2] ** 2 * dt
-        p[12 + i, 12 + i] += noise[3] ** 2 * dt
+        p[9 + i, 9 + i] += noise.gyro_walk**2 * dt
+        p[12 + i, 12 + i] += noise.accel_walk**2 * dt
+    for i in range(15, 17):
+        p[i, i] += noise.gravity_walk**2 * dt

@@ -6,9 +6,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.odometry.config import DriftConfig
-from pipeline.odometry.drift import Drift, tilt_along
+from pipeline.odometry.drift import Drift
 
-CONFIG = DriftConfig(yaw_deg_per_root_m=0.5, horizontal=0.01, vertical=0.005, correlated_m=10.0)
+CONFIG = DriftConfig(yaw_deg_per_root_m=0.5, horizontal=0.01, vertical=0.005, correlated_m=10.0, tilt_lasts_m=10.0)
 
 
 def way():
@@ -74,7 +74,7 @@ def test_a_tilt_lifts_the_way_until_it_is_known():
     random, count, tilt, step_m = np.random.default_rng(2), 20000, math.radians(1.0), 0.1
     level = msgspec.structs.replace(CONFIG, vertical=0.0)
     drift, height, slope = Drift(level), np.zeros(count), tilt * random.standard_normal(count)
-    kept = math.exp(-step_m / level.correlated_m)
+    kept = math.exp(-step_m / level.tilt_lasts_m)
     for k in range(200):
         if k == 100:
             measured = slope + tilt * math.sqrt(0.04 / 0.96) * random.standard_normal(count)
@@ -84,10 +84,3 @@ def test_a_tilt_lifts_the_way_until_it_is_known():
         drift.move(np.array([step_m, 0.0, 0.0]), tilt=tilt**2)
     found = drift.add_to(np.zeros((6, 6)), np.eye(3))
     assert math.sqrt(found[5, 5]) == pytest.approx(height.std(), rel=0.05)
-
-
-def test_the_tilt_along_a_step_is_that_about_the_axis_across_it():
-    axes, covariance = np.eye(3)[:, :2], np.diag([0.02**2, 0.05**2])
-    assert math.sqrt(tilt_along(np.array([0.3, 0.0, 0.0]), axes, covariance)) == pytest.approx(0.05)
-    assert math.sqrt(tilt_along(np.array([0.0, -0.2, 0.0]), axes, covariance)) == pytest.approx(0.02)
-    assert tilt_along(np.zeros(3), axes, covariance) == 0.0

