@@ -63,6 +63,7 @@ VARIANTS = (
     Variant("one voxel from all sides", {"map.sides": 1}),
     Variant("stems taken as flat", {"match.round_m": 0.0}),
     Variant("a gyro bias that walks a third as fast", {"imu.gyro_walk_rad_s": 3e-5}),
+    Variant("gravity held fixed", {"imu.gravity_walk_rad": 0.0}),
     Variant("every voxel counts alike, however old", {"match.fresh_share": 1.0}),
     Variant("fine grid alone", {"map.sizes_m": (0.3,)}),
     Variant("coarse grid alone (0.6 m)", {"map.sizes_m": (0.6,)}),
