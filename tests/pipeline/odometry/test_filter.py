@@ -25,6 +25,11 @@ def spread(seed, size=1.0):
     return np.outer(scale, scale) * (random @ random.T) / (2 * ERRORS)
 
 
+def at_rest():
+    """Samples (21, 7) of a scan."""
+    return np.column_stack([np.linspace(0.0, 0.1, 21), np.zeros((21, 3)), np.tile([0.0, 0.0, 9.8], (21, 1))])
+
+
 class Beacons:
     """Points of known places that are seen from the true pose, with noise of a given sigma."""
 
@@ -84,11 +89,10 @@ def test_the_surprise_is_a_chi_square_of_six():
 
 
 def test_a_scan_that_contradicts_the_samples_is_followed_when_it_says_enough():
-    samples = np.column_stack([np.linspace(0.0, 0.1, 21), np.zeros((21, 3)), np.tile([0.0, 0.0, 9.8], (21, 1))])
     ended = {}
     for matches in (MANY, 20):
         filter_ = Filter(somewhere(), np.diag([1e-4] * ERRORS) ** 2, ImuConfig(), STEADY)
-        filter_.propagate(samples)
+        filter_.propagate(at_rest())
         beacons, prior = Beacons(filter_.state, 0.02), filter_.state
 
         def equations(state, k, beacons=beacons, matches=matches):
@@ -99,6 +103,18 @@ def test_a_scan_that_contradicts_the_samples_is_followed_when_it_says_enough():
         ended[matches] = filter_.state.minus(prior)
     np.testing.assert_allclose(ended[MANY][:6], [*TRUE_TURN, *TRUE_SHIFT], atol=0.05)
     assert np.linalg.norm(ended[MANY][3:6] - TRUE_SHIFT) < 0.5 * np.linalg.norm(ended[20][3:6] - TRUE_SHIFT)
+
+
+def test_after_a_start_on_the_way_the_accelerometer_counts_for_less_at_first():
+    imu = ImuConfig(accel_density_m_s2=0.01, joined_accel_density_m_s2=0.05, joined_s=0.25, accel_share=0.0)
+    variances = {False: [], True: []}
+    for joined, found in variances.items():
+        filter_ = Filter(somewhere(), np.zeros((ERRORS, ERRORS)), imu, STEADY, joined=joined)
+        for _ in range(4):
+            filter_.propagate(at_rest())
+            found.append(filter_.covariance[8, 8])
+    grown = {joined: np.diff(found, prepend=0.0) for joined, found in variances.items()}
+    np.testing.assert_allclose(grown[True] / grown[False], [25.0, 25.0, 1.0, 1.0], rtol=1e-3)
 
 
 def test_biases_stay_within_what_a_sensor_can_have():
