@@ -28,8 +28,8 @@ from drivers.sim.transport_mux import PACKET, TransportMux
 logger = logging.getLogger(__name__)
 FRAME_NS = (1001 * 1_000_000_000, 30_000)
 DATAGRAM = 7 * PACKET
-AHEAD = 15
-"""Frames made ahead of their time."""
+AHEAD = 150
+"""Frames made ahead of their time, so that what starts beside the camera may take the processor for some seconds."""
 TRUTH_EVERY = 3
 AUDIO_TICKS = 1920
 """1024 samples at 48 kHz, in 90 kHz ticks."""
